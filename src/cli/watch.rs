@@ -94,7 +94,7 @@ pub(super) fn run(args: &WatchArgs, is_json: bool) -> Result<Report, Failure> {
         still: None,
         model: None,
         bound: None,
-        failed: None,
+        failed_save: None,
     };
     let mut news = vec![News::Mesh, News::FirstTemplate];
     let (mut builds, mut is_heard) = (0_u64, true);
@@ -179,7 +179,7 @@ struct Watch<'a> {
     model: Option<Model>,
     bound: Option<BoundMesh>,
     /// Save of the character that failed, and is tried again: the disk may be full only for a while.
-    failed: Option<FailedSave>,
+    failed_save: Option<FailedSave>,
 }
 
 impl Watch<'_> {
@@ -190,7 +190,9 @@ impl Watch<'_> {
             let is_mesh = self.mesh.as_mut().is_some_and(|mesh| mesh.look(&RealDisk));
             let template = self.template.look(&RealDisk).map(News::Template);
             let mut news: Vec<News> = is_mesh.then_some(News::Mesh).into_iter().chain(template).collect();
-            if news.is_empty() && self.failed.as_mut().is_some_and(|failed| failed.is_due(&RealDisk, Instant::now())) {
+            if news.is_empty()
+                && self.failed_save.as_mut().is_some_and(|failed| failed.is_due(&RealDisk, Instant::now()))
+            {
                 news.push(News::Again);
             }
             if !news.is_empty() {
@@ -220,7 +222,7 @@ impl Watch<'_> {
             News::Again => match self.still.clone() {
                 Some(bytes) => {
                     // Where a part of the template is not there for a while, its return is news.
-                    self.failed = None;
+                    self.failed_save = None;
                     let rig = self.parsed(&bytes)?.0;
                     self.write_still(start, rig)
                 }
@@ -310,7 +312,7 @@ impl Watch<'_> {
         runs: &[(Uid, u32)],
         reloaded: Option<ReloadReport>,
     ) -> Result<Option<Value>, Failure> {
-        self.failed = None;
+        self.failed_save = None;
         let args = self.args;
         let Some(bench) = &self.bench else { return Ok(None) };
         let (model, settings) = if self.mesh.is_none() {
@@ -336,7 +338,7 @@ impl Watch<'_> {
 
     /// Writes a rig that nothing moves, and says so as [`Watch::write`] does.
     fn write_still(&mut self, start: Instant, rig: Rig) -> Result<Option<Value>, Failure> {
-        self.failed = None;
+        self.failed_save = None;
         let (model, settings) = still_skeleton(rig, &self.args.export)?;
         let built_in = start.elapsed();
         self.store(model, &settings)?;
@@ -349,7 +351,7 @@ impl Watch<'_> {
         let output = &self.args.output;
         let stored = store_owned_model(&RealDisk, output, model, settings);
         if let Err(StoreError::Save(error)) = &stored {
-            self.failed = Some(FailedSave::new(&RealDisk, output, error, Instant::now()));
+            self.failed_save = Some(FailedSave::new(&RealDisk, output, error, Instant::now()));
         }
         stored?;
         Ok(())

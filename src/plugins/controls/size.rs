@@ -176,18 +176,18 @@ mod tests {
 
     /// Uid that counts how often it is compared.
     #[derive(Clone, Copy)]
-    struct Counted<'a>(u64, &'a Cell<usize>);
+    struct CountedUid<'a>(u64, &'a Cell<usize>);
 
-    impl PartialEq for Counted<'_> {
+    impl PartialEq for CountedUid<'_> {
         fn eq(&self, other: &Self) -> bool {
             self.1.set(self.1.get() + 1);
             self.0 == other.0
         }
     }
 
-    impl Eq for Counted<'_> {}
+    impl Eq for CountedUid<'_> {}
 
-    impl Hash for Counted<'_> {
+    impl Hash for CountedUid<'_> {
         fn hash<H: Hasher>(&self, state: &mut H) {
             self.0.hash(state);
         }
@@ -197,8 +197,8 @@ mod tests {
     fn factors_of_many_controls_are_found_at_once() {
         let compared = |count: u64| {
             let compared = Cell::new(0);
-            let found: Vec<_> = (0..count).map(|number| (Counted(2 * number, &compared), 2.0)).collect();
-            let nodes = (0..2 * count).map(|number| Counted(number, &compared));
+            let found: Vec<_> = (0..count).map(|number| (CountedUid(2 * number, &compared), 2.0)).collect();
+            let nodes = (0..2 * count).map(|number| CountedUid(number, &compared));
             for (number, factor) in factor_of_each(&found, nodes).enumerate() {
                 assert_eq!(factor, if number % 2 == 0 { 2.0 } else { 1.0 }, "{number}");
             }

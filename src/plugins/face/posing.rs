@@ -56,7 +56,7 @@ enum PoseWork {
     /// They are computed in the background.
     Task(Task<Vec<BonePose>>),
     /// They are known, and shown in the next frame.
-    Known(Vec<BonePose>),
+    Ready(Vec<BonePose>),
 }
 
 impl FacePosing {
@@ -93,7 +93,7 @@ impl FacePosing {
 
     /// Holds the known pose of a request until the next frame.
     pub(super) fn hold(&mut self, parts: &Arc<PreparedParts>, poses: Vec<BonePose>, request: ExpressRequest) {
-        let (work, parts) = (PoseWork::Known(poses), Arc::downgrade(parts));
+        let (work, parts) = (PoseWork::Ready(poses), Arc::downgrade(parts));
         self.running = Some(RunningPose { work, parts, request, queue: Vec::new() });
     }
 
@@ -116,7 +116,7 @@ impl FacePosing {
     pub(super) fn land(&mut self) -> Vec<(ExpressRequest, bool)> {
         let Some(RunningPose { work, parts, request, queue }) = self.running.take() else { return Vec::new() };
         let (poses, is_of_background) = match work {
-            PoseWork::Known(poses) => (poses, false),
+            PoseWork::Ready(poses) => (poses, false),
             PoseWork::Task(mut task) => match check_ready(&mut task) {
                 Some(poses) => (poses, true),
                 None => {
