@@ -20,7 +20,7 @@ fn joint(report: &WindowReport, label: &str) -> [f32; 2] {
 }
 
 /// Waits for a file that is written in the background.
-pub(super) fn until_there(path: &Path) {
+fn until_there(path: &Path) {
     let start = Instant::now();
     while !path.exists() && start.elapsed() < PATIENCE {
         sleep(Duration::from_millis(100));
