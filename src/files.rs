@@ -21,6 +21,7 @@ mod atomic;
 mod disk;
 mod disk_error;
 mod expressions;
+mod failed_save;
 mod fault;
 mod folder;
 mod identity;
@@ -56,6 +57,7 @@ pub use disk_error::DiskError;
 pub use expressions::{
     ExpressionFileError, FoundFiles, LeftOut, SITE_DEPTH, files_below, is_expression_file, load_expressions,
 };
+pub use failed_save::FailedSave;
 pub use fault::{Fault, FaultPlan, FaultyDisk};
 pub use folder::{ModelFolder, UriError};
 pub use identity::is_same_file;

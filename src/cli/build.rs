@@ -226,7 +226,7 @@ fn trace(args: &BuildArgs, report: &mut Report, rig: &Rig, builder: &Builder, ou
             CommandState::Failed => "failed",
         };
         let label = rig.joint(entry.joint).and_then(|joint| joint.data.label.clone());
-        let skipped = status.skipped.as_ref().map(ToString::to_string);
+        let skipped = status.skipped.as_ref().map(|reason| limits::message(&reason.to_string()));
         let stop = outcome.error.as_ref().filter(|error| error.command == entry.command);
         let error = stop.map(|error| &error.problem).or(status.error.as_ref());
         if args.trace {
@@ -242,7 +242,7 @@ fn trace(args: &BuildArgs, report: &mut Report, rig: &Rig, builder: &Builder, ou
             "state": state,
             "micros": status.micros,
             "executed": executed.contains(&entry.command),
-            "error": error.map(ToString::to_string),
+            "error": error.map(|error| limits::message(&error.to_string())),
             "skipped": skipped,
         }))
     });

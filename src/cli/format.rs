@@ -67,7 +67,7 @@ pub(super) fn run(args: &FormatArgs) -> Result<Report, Failure> {
                 report.at_fault = true;
                 let name = path.display().to_string();
                 report.fault.get_or_insert_with(|| Explanation::of_error(error.as_ref(), &name));
-                formatted.push((path, FileLayout::Fault(error.to_string())));
+                formatted.push((path, FileLayout::Fault(limits::message(&error.to_string()))));
             }
             found => {
                 let (before, after) = found?;

@@ -9,7 +9,12 @@ use std::{
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::{Failure, Report, limits::check_time, report::counted, timed_disk::TimedDisk};
+use super::{
+    Failure, Report,
+    limits::{self, check_time},
+    report::counted,
+    timed_disk::TimedDisk,
+};
 use crate::{
     files::{
         FolderListError, FolderListing, HeaderMemory, ListedTemplate, NewestVersions, SearchPaths, TemplatePlace,
@@ -119,7 +124,7 @@ fn tell(one: &ListedTemplate, newest: &NewestVersions, report: &mut Report) -> V
     let file = &place.to_string();
     let header = match header {
         Ok(header) => header,
-        Err(error) => return json!({ "file": file, "error": error.to_string() }),
+        Err(error) => return json!({ "file": file, "error": limits::message(&error.to_string()) }),
     };
     let mut value = value(file, header);
     let newer = newest.get(&VersionedTemplate::of(header));

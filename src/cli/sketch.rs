@@ -82,7 +82,11 @@ pub(super) fn run(args: &SketchArgs) -> Result<Report, Failure> {
         counted(answers.len(), "gesture", "gestures"),
         counted(joints, "joint", "joints")
     ));
-    let told = answers.iter().map(|answer| serde_json::to_value(answer).unwrap_or(Value::Null));
+    let told = answers.iter().map(|answer| {
+        let mut value = serde_json::to_value(answer).unwrap_or(Value::Null);
+        value["message"] = limits::message(&answer.message).into();
+        value
+    });
     report.set_list("gestures", told);
     describe_rig(&mut report, bench.rig());
     save(&mut bench, &args.output, kind, args, &mut report)?;

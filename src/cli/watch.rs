@@ -20,7 +20,10 @@ use super::{
     report::{counted, print, print_json},
 };
 use crate::{
-    files::{FileKind, LOOK, LoadError, ModelWatch, PartFiles, RealDisk, StoreError, TemplateWatch, store_owned_model},
+    files::{
+        FailedSave, FileKind, LOOK, LoadError, ModelWatch, PartFiles, RealDisk, StoreError, TemplateWatch,
+        store_owned_model,
+    },
     headless::{Workbench, posing::PoseError},
     mesh::{gltf::GltfWriteSettings, model::Model},
     plugins::{
@@ -63,9 +66,6 @@ pub(super) struct WatchArgs {
 /// Commands that are named after a build.
 const NAMED: usize = 6;
 
-/// Pause before a character that could not be written is written again.
-const AGAIN: Duration = Duration::from_secs(1);
-
 /// Remedy where the text of an error names none.
 const SAVE_AGAIN: &str = "correct it and save the file again, which is waited for";
 
@@ -94,7 +94,7 @@ pub(super) fn run(args: &WatchArgs, is_json: bool) -> Result<Report, Failure> {
         still: None,
         model: None,
         bound: None,
-        again: None,
+        failed_save: None,
     };
     let mut news = vec![News::Mesh, News::FirstTemplate];
     let (mut builds, mut is_heard) = (0_u64, true);
@@ -178,8 +178,8 @@ struct Watch<'a> {
     /// The mesh as it was read last; `None` until it can be read.
     model: Option<Model>,
     bound: Option<BoundMesh>,
-    /// Time at which the character is written again, because it could not be: the disk may be full only for a while.
-    again: Option<Instant>,
+    /// Save of the character that failed, and is tried again: the disk may be full only for a while.
+    failed_save: Option<FailedSave>,
 }
 
 impl Watch<'_> {
@@ -190,7 +190,9 @@ impl Watch<'_> {
             let is_mesh = self.mesh.as_mut().is_some_and(|mesh| mesh.look(&RealDisk));
             let template = self.template.look(&RealDisk).map(News::Template);
             let mut news: Vec<News> = is_mesh.then_some(News::Mesh).into_iter().chain(template).collect();
-            if news.is_empty() && self.again.is_some_and(|again| Instant::now() >= again) {
+            if news.is_empty()
+                && self.failed_save.as_mut().is_some_and(|failed| failed.is_due(&RealDisk, Instant::now()))
+            {
                 news.push(News::Again);
             }
             if !news.is_empty() {
@@ -219,8 +221,8 @@ impl Watch<'_> {
             News::Mesh => self.take_mesh(start, &runs),
             News::Again => match self.still.clone() {
                 Some(bytes) => {
-                    // A part of the template may not be there for a while, too.
-                    self.again = Some(Instant::now() + AGAIN);
+                    // Where a part of the template is not there for a while, its return is news.
+                    self.failed_save = None;
                     let rig = self.parsed(&bytes)?.0;
                     self.write_still(start, rig)
                 }
@@ -310,7 +312,7 @@ impl Watch<'_> {
         runs: &[(Uid, u32)],
         reloaded: Option<ReloadReport>,
     ) -> Result<Option<Value>, Failure> {
-        self.again = None;
+        self.failed_save = None;
         let args = self.args;
         let Some(bench) = &self.bench else { return Ok(None) };
         let (model, settings) = if self.mesh.is_none() {
@@ -336,7 +338,7 @@ impl Watch<'_> {
 
     /// Writes a rig that nothing moves, and says so as [`Watch::write`] does.
     fn write_still(&mut self, start: Instant, rig: Rig) -> Result<Option<Value>, Failure> {
-        self.again = None;
+        self.failed_save = None;
         let (model, settings) = still_skeleton(rig, &self.args.export)?;
         let built_in = start.elapsed();
         self.store(model, &settings)?;
@@ -346,8 +348,11 @@ impl Watch<'_> {
     /// Saves the character; where that fails, it is tried again after a while.
     fn store(&mut self, model: Model, settings: &GltfWriteSettings) -> Result<(), Failure> {
         // What is written is read back, which takes as much memory again.
-        let stored = store_owned_model(&RealDisk, &self.args.output, model, settings);
-        self.again = matches!(stored, Err(StoreError::Save(_))).then(|| Instant::now() + AGAIN);
+        let output = &self.args.output;
+        let stored = store_owned_model(&RealDisk, output, model, settings);
+        if let Err(StoreError::Save(error)) = &stored {
+            self.failed_save = Some(FailedSave::new(&RealDisk, output, error, Instant::now()));
+        }
         stored?;
         Ok(())
     }

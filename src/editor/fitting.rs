@@ -242,7 +242,7 @@ fn show_result(
     selections: Query<&Selection>,
     mut commands: Commands,
 ) {
-    for FitAnswer { mesh, result } in answers.read() {
+    for FitAnswer { mesh, result, .. } in answers.read() {
         let report = match result {
             Ok(report) => report,
             Err(FitFailure::Fit(FitError::Cancelled)) => {

@@ -2,7 +2,10 @@
 
 use std::{path::Path, sync::Arc};
 
-use bevy::{ecs::entity::EntityHashSet, prelude::*};
+use bevy::{
+    ecs::{entity::EntityHashSet, message::MessageId},
+    prelude::*,
+};
 
 use super::{
     BuiltTemplate, RigBuilt, RigFailed, RigTemplate, RigTemplates, RigUpdated, TemplateError,
@@ -53,8 +56,8 @@ pub struct RigSource {
     is_unbound: bool,
     /// The template that was compared last.
     seen: Option<Arc<BuiltTemplate>>,
-    /// An update that was requested, and the base that it brings.
-    pending: Option<(Arc<BuiltTemplate>, BaseVersion)>,
+    /// An update that was requested.
+    pending: Option<RequestedUpdate>,
     /// An update that was made in this frame.
     trial: Option<Arc<BuiltTemplate>>,
     /// Poses and motion that could not be kept in the update that was requested.
@@ -62,6 +65,14 @@ pub struct RigSource {
     /// True if the build had failed before the update.
     had_failed: bool,
     steps: Vec<AcceptedUpdate>,
+}
+
+/// Update that was requested, and the base that it brings.
+#[derive(Debug, Clone)]
+struct RequestedUpdate {
+    request: MessageId<EditRequest>,
+    built: Arc<BuiltTemplate>,
+    base: BaseVersion,
 }
 
 /// Poses and motion that an update cannot keep.
@@ -124,6 +135,11 @@ impl RigSource {
     pub fn without_binding(mut self) -> Self {
         self.is_unbound = true;
         self
+    }
+
+    /// The update of this request; any other one stays.
+    fn take_requested(&mut self, request: Option<MessageId<EditRequest>>) -> Option<RequestedUpdate> {
+        self.pending.take_if(|update| Some(update.request) == request)
     }
 
     /// The template as it was built last.
@@ -218,12 +234,14 @@ pub(super) fn follow_steps(
     mut sources: Query<&mut RigSource>,
     mut commands: Commands,
 ) {
-    for EditReport { rig, name, committed, .. } in edited.read() {
+    for EditReport { rig, request, committed, .. } in edited.read() {
         let (Ok(mut source), Some(committed)) = (sources.get_mut(*rig), committed) else { continue };
         let known = source.steps.iter().find(|known| Arc::ptr_eq(&known.step, committed.step())).cloned();
         match (committed, known) {
-            (Commit::Done(step), _) if *name == UPDATE => {
-                let Some((built, after)) = source.pending.take() else { continue };
+            (Commit::Done(step), _) => {
+                let own = source.bypass_change_detection().take_requested(*request);
+                let Some(update) = own else { continue };
+                let (built, after) = (update.built, update.base);
                 let before = source.base.take();
                 source.base = Some(after.clone());
                 // Steps that the history dropped are neither undone nor redone.
@@ -236,9 +254,9 @@ pub(super) fn follow_steps(
             _ => {}
         }
     }
-    for EditRefusal { rig, reason } in refused.read() {
+    for EditRefusal { rig, request, reason } in refused.read() {
         if let Ok(mut source) = sources.get_mut(*rig)
-            && source.pending.take().is_some()
+            && source.take_requested(*request).is_some()
         {
             commands.trigger(RigFailed { entity: *rig, error: TemplateError::Load(reason.to_string()) });
         }
@@ -382,8 +400,8 @@ fn take_over(
                 Ok(clips) => edits.extend(clips),
                 Err(error) => warn!("clips were not re-expressed: {error}"),
             }
-            source.pending = Some((built.clone(), base));
-            requests.write(EditRequest::operation(entity, Operation::Named { name: UPDATE, edits }));
+            let request = requests.write(EditRequest::operation(entity, Operation::Named { name: UPDATE, edits }));
+            source.pending = Some(RequestedUpdate { request, built: built.clone(), base });
         }
         Err(error) => commands.trigger(RigFailed { entity, error: TemplateError::Load(error.to_string()) }),
     }

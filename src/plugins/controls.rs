@@ -154,7 +154,7 @@ fn throw_switches(
                 commands.write_message(EditRequest::operation(*rig, operation));
             }
             Err(error) => {
-                commands.write_message(EditRefusal { rig: *rig, reason: error.into() });
+                commands.write_message(EditRefusal { rig: *rig, request: None, reason: error.into() });
             }
         }
     }

@@ -18,7 +18,7 @@ mod selection_operation;
 
 use std::{borrow::Cow, sync::Arc};
 
-use bevy::prelude::*;
+use bevy::{ecs::message::MessageId, prelude::*};
 
 pub(in crate::plugins) use self::selection_operation::chain_labels;
 pub use self::{
@@ -94,6 +94,8 @@ pub struct ShowRest(pub bool);
 pub struct Symmetry(pub Option<MirrorPlane>);
 
 /// Request for one change of a rig. Requests are carried out in the order in which they are sent.
+///
+/// Writing one gives its [`MessageId`]. All answers carry it, so that code that waits for an answer takes no other for its own.
 #[derive(Message, Debug, Clone)]
 pub struct EditRequest {
     /// The rig.
@@ -173,6 +175,8 @@ impl EditRequest {
 pub struct EditReport {
     /// The rig.
     pub rig: Entity,
+    /// Request that was carried out; `None` for writes to entities.
+    pub request: Option<MessageId<EditRequest>>,
     /// Short name of the step that was done, undone or redone.
     pub name: Cow<'static, str>,
     /// Committed change; `None` if the operation had nothing to do or is only previewed.
@@ -197,6 +201,8 @@ impl EditReport {
 pub struct ChangeReport {
     /// The rig.
     pub rig: Entity,
+    /// Request that is answered.
+    pub request: MessageId<EditRequest>,
     /// Step that was made, undone or redone; or the reason of the refusal.
     pub step: Result<ReportedStep, ChangeError>,
 }
@@ -230,6 +236,8 @@ pub struct ReportedChain {
 pub struct EditRefusal {
     /// Requested rig.
     pub rig: Entity,
+    /// Refused request; `None` for writes to entities, and for switches that became no request.
+    pub request: Option<MessageId<EditRequest>>,
     /// Reason for the refusal.
     pub reason: ChangeError,
 }
@@ -248,17 +256,19 @@ fn apply_edits(
     let mut added = added_chains::AddedChains::default();
     let of_entities = std::mem::take(&mut entity_edits.bypass_change_detection().0).into_iter().map(|(rig, edits)| {
         let operation = Operation::Named { name: "Edit entities", edits };
-        (EditRequest { rig, change: Change::Do(operation) }, true)
+        (None, EditRequest { rig, change: Change::Do(operation) })
     });
-    let asked = held.due(requests.read().cloned(), &awaited, |rig| rigs.contains(rig));
-    for (request, is_of_entities) in of_entities.chain(asked.into_iter().map(|request| (request, false))) {
-        let EditRequest { rig, change: requested } = &request;
+    let asked = requests.read_with_id().map(|(request, id)| (id, request.clone()));
+    let due = held.due(asked, &awaited, |rig| rigs.contains(rig));
+    for (request, asked) in of_entities.chain(due.into_iter().map(|(id, asked)| (Some(id), asked))) {
+        let is_of_entities = request.is_none();
+        let EditRequest { rig, change: requested } = &asked;
         let rig = *rig;
         let Ok((mut document, mut selection, mut history, symmetry, auto_key, built)) = rigs.get_mut(rig) else {
-            refused.write(EditRefusal { rig, reason: ChangeError::NoRig(rig) });
+            refused.write(EditRefusal { rig, request, reason: ChangeError::NoRig(rig) });
             continue;
         };
-        let is_reported = has_report(requested);
+        let reported_request = request.filter(|_| has_report(requested));
         let before = document.len();
         let operation;
         let bound = match requested {
@@ -286,16 +296,17 @@ fn apply_edits(
                 ReportedStep { name: Cow::Borrowed("Pick"), added: 0, joints: before, chain: None, picked }
             });
             if let Err(reason) = &step {
-                refused.write(EditRefusal { rig, reason: reason.clone() });
+                refused.write(EditRefusal { rig, request, reason: reason.clone() });
             }
-            reported.write(ChangeReport { rig, step });
+            reported.write_batch(request.map(|request| ChangeReport { rig, request, step }));
             continue;
         }
         // The selection is written only where it changes.
         let mut selected = selection.clone();
-        let done = |name, committed| EditReport { rig, name, committed, preview: false, notes: Vec::new() };
+        let done = |name, committed| EditReport { rig, request, name, committed, preview: false, notes: Vec::new() };
         let previewed = |name: &'static str| EditReport {
             rig,
+            request,
             name: name.into(),
             committed: None,
             preview: true,
@@ -360,7 +371,7 @@ fn apply_edits(
         selection.set_if_neq(selected);
         let tip = selection.active().filter(|_| result.is_ok());
         added.note(rig, &document, requested, tip);
-        if is_reported {
+        if let Some(request) = reported_request {
             let chain = match (requested, change) {
                 (Change::Draw { .. }, Change::Do(Operation::Chain { parent, .. })) => {
                     Some(ReportedChain { parent: *parent, tip })
@@ -375,14 +386,14 @@ fn apply_edits(
                 chain,
                 picked: None,
             });
-            reported.write(ChangeReport { rig, step: step.map_err(ChangeError::clone) });
+            reported.write(ChangeReport { rig, request, step: step.map_err(ChangeError::clone) });
         }
         match result {
             Ok(message) => {
                 edited.write(message);
             }
             Err(reason) => {
-                refused.write(EditRefusal { rig, reason });
+                refused.write(EditRefusal { rig, request, reason });
             }
         }
     }

@@ -14,6 +14,7 @@ mod work;
 use std::sync::Arc;
 
 use bevy::{
+    ecs::message::MessageId,
     prelude::*,
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
 };
@@ -161,6 +162,8 @@ impl Default for FitTemplates {
 pub struct FitAnswer {
     /// The mesh.
     pub mesh: Entity,
+    /// Edit that the fit became; `None` for a failed one.
+    pub edit: Option<MessageId<EditRequest>>,
     /// Report of the fit, or the reason why there is none.
     pub result: Result<Arc<FitReport>, FitFailure>,
 }
@@ -238,11 +241,11 @@ fn start(
     for request in requests.read() {
         let found = meshes.get(request.mesh).ok().and_then(|(mesh, of)| Some((mesh, rigs.get(of.0).ok()?)));
         let Some((mesh, (rig, history, markers))) = found else {
-            fitted.write(FitAnswer { mesh: request.mesh, result: Err(FitFailure::NoRig) });
+            fitted.write(FitAnswer { mesh: request.mesh, edit: None, result: Err(FitFailure::NoRig) });
             continue;
         };
         if let Err(error) = limits.check_open(mesh) {
-            fitted.write(FitAnswer { mesh: request.mesh, result: Err(error.into()) });
+            fitted.write(FitAnswer { mesh: request.mesh, edit: None, result: Err(error.into()) });
             continue;
         }
         let from = Arc::new(rig.clone());
@@ -289,9 +292,9 @@ fn land(
             }),
         };
         let Some(result) = finished else { continue };
-        let result = match (result, rigs.get(of.0)) {
-            (Err(error), _) => Err(error),
-            (Ok(_), Err(_)) => Err(FitFailure::NoRig),
+        let failure = match (result, rigs.get(of.0)) {
+            (Err(error), _) => Some(error),
+            (Ok(_), Err(_)) => Some(FitFailure::NoRig),
             (Ok(finished), Ok((rig, history))) => {
                 match job.landing.decide(history, || is_same_skeleton(rig, &job.from)) {
                     JobOutcome::Hold { is_news } => {
@@ -301,30 +304,36 @@ fn land(
                         }
                         continue;
                     }
-                    JobOutcome::Drop => Err(FitFailure::Changed),
-                    JobOutcome::Commit => commit(of.0, finished, (rig, history), &modules, &mut commands),
+                    JobOutcome::Drop => Some(FitFailure::Changed),
+                    JobOutcome::Commit => {
+                        commit((entity, of.0), finished, (rig, history), &modules, &mut commands).err()
+                    }
                 }
             }
         };
-        answers.write(FitAnswer { mesh: entity, result });
+        answers.write_batch(failure.map(|failure| FitAnswer { mesh: entity, edit: None, result: Err(failure) }));
         commands.entity(entity).try_remove::<FitJob>();
     }
 }
 
-/// Requests the edits of a finished fit.
+/// Requests the edits of a finished fit of a mesh of a rig, and answers with its report.
 fn commit(
-    rig_entity: Entity,
+    (mesh, rig_entity): (Entity, Entity),
     FinishedFit { mut fitted, target }: FinishedFit,
     (rig, history): (&Rig, &RigHistory),
     modules: &RigModules,
     commands: &mut Commands,
-) -> Result<Arc<FitReport>, FitFailure> {
+) -> Result<(), FitFailure> {
     let edits = fitted.edits(rig, &target, &modules.0)?;
     let report = fitted.report.clone();
     fitted.before = history.last().cloned();
-    commands.write_message(EditRequest::operation(rig_entity, Operation::Named { name: FIT, edits }));
+    let request = EditRequest::operation(rig_entity, Operation::Named { name: FIT, edits });
+    commands.queue(move |world: &mut World| {
+        let edit = world.write_message(request);
+        world.write_message(FitAnswer { mesh, edit, result: Ok(report) });
+    });
     commands.entity(rig_entity).try_insert(PendingFit(fitted));
-    Ok(report)
+    Ok(())
 }
 
 /// True if two rigs have the same joints at the same places.

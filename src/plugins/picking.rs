@@ -9,7 +9,10 @@
 use std::collections::HashSet;
 
 use bevy::{
-    ecs::entity::{EntityHashMap, EntityHashSet},
+    ecs::{
+        entity::{EntityHashMap, EntityHashSet},
+        message::MessageId,
+    },
     math::Affine3A,
     prelude::*,
 };
@@ -120,6 +123,8 @@ struct HoverSpot {
 pub struct PickAnswer {
     /// The rig.
     pub rig: Entity,
+    /// Request that is answered.
+    pub request: MessageId<PickRequest>,
     /// The picked joints; empty if the request hit none.
     pub joints: Vec<Uid>,
 }
@@ -189,9 +194,12 @@ fn forget_click(changed: Query<Entity, Changed<Rig>>, mut last: ResMut<LastClick
     }
 }
 
+/// Request with its identity, and the number of the state of the surface that it waits for.
+type WaitingPick = (PickRequest, MessageId<PickRequest>, Option<u64>);
+
 fn pick(
     mut requests: MessageReader<PickRequest>,
-    mut waiting: Local<Vec<(PickRequest, Option<u64>)>>,
+    mut waiting: Local<Vec<WaitingPick>>,
     rigs: Query<PickItem>,
     mut selections: Query<&mut Selection>,
     joints: Query<&GlobalTransform>,
@@ -200,20 +208,20 @@ fn pick(
     mut last: ResMut<LastClick>,
     mut picked: MessageWriter<PickAnswer>,
 ) {
-    waiting.extend(requests.read().map(|request| (request.clone(), None)));
+    waiting.extend(requests.read_with_id().map(|(request, id)| (request.clone(), id, None)));
     // Requests are answered in their order: a request after a waiting click waits, too.
     let mut busy: Vec<Entity> = Vec::new();
     // Joints stand still while requests of one frame are answered.
     let mut trees: EntityHashMap<(PickTree, Vec<Uid>)> = EntityHashMap::default();
     let mut selected: EntityHashMap<HashSet<Uid>> = EntityHashMap::default();
     let mut open = std::mem::take(&mut *waiting).into_iter().peekable();
-    while let Some((request, mut since)) = open.next() {
+    while let Some((request, id, mut since)) = open.next() {
         let (Ok(seen), Ok(mut selection)) = (rigs.get(request.rig), selections.get_mut(request.rig)) else {
             continue;
         };
         let (rig, entities, place, surface, meshes, nodes, created) = seen;
         if busy.contains(&request.rig) {
-            waiting.push((request, since));
+            waiting.push((request, id, since));
             continue;
         }
         let found: Vec<Uid> = match &request.what {
@@ -231,14 +239,14 @@ fn pick(
             Pick::Click { plane, point, reach } => {
                 let Answer::Now(surface) = answer(&mut since, meshes.is_some(), surface) else {
                     busy.push(request.rig);
-                    waiting.push((request, since));
+                    waiting.push((request, id, since));
                     continue;
                 };
                 let hit = first_hit(surface, plane, *point);
                 let (tree, uids) =
                     trees.entry(request.rig).or_insert_with(|| posed_tree(rig, entities, place, &joints));
                 last.look(request.rig, plane, *reach);
-                let next = open.peek().map(|(next, _)| next);
+                let next = open.peek().map(|(next, ..)| next);
                 // Clicks on controls leave the cycle as it is.
                 let is_single = !in_use.0
                     && !last.cycle.is_at(*point, *reach)
@@ -267,7 +275,7 @@ fn pick(
             selected.remove(&request.rig);
             selection.set_if_neq(Selection(found.clone()));
         }
-        picked.write(PickAnswer { rig: request.rig, joints: found });
+        picked.write(PickAnswer { rig: request.rig, request: id, joints: found });
     }
 }
 

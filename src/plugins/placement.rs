@@ -5,7 +5,7 @@
 //! reports it. While the surface is behind the pose, requests wait for it; steps that are undone meanwhile are not lost to
 //! a request that waited, which is refused then.
 
-use bevy::prelude::*;
+use bevy::{ecs::message::MessageId, prelude::*};
 
 use super::{
     RigSystems, configure_sets,
@@ -48,6 +48,10 @@ pub struct PlaceRequest {
 pub struct PlaceAnswer {
     /// The rig.
     pub rig: Entity,
+    /// Request that is answered.
+    pub request: MessageId<PlaceRequest>,
+    /// Edit that places the joint; `None` where there is nothing to place.
+    pub edit: Option<MessageId<EditRequest>>,
     /// Hits of the ray, and the position of the joint; [`Placement::Nothing`] for a refused request.
     pub placement: Placement,
     /// True if the request waited for the surface.
@@ -94,6 +98,7 @@ pub fn joint_at(
 /// Request that waits for the surface.
 pub(super) struct WaitingPlace {
     request: PlaceRequest,
+    id: MessageId<PlaceRequest>,
     /// State of the surface that it waits for.
     since: Option<u64>,
     landing: Landing,
@@ -107,18 +112,20 @@ pub(super) fn place(
     mut edits: MessageWriter<EditRequest>,
     mut placed: MessageWriter<PlaceAnswer>,
 ) {
-    let arrived = requests.read().filter_map(|request| {
+    let arrived = requests.read_with_id().filter_map(|(request, id)| {
         let (_, _, history, ..) = rigs.get(request.rig).ok()?;
         let landing = Landing::asked(history);
-        Some(WaitingPlace { request: request.clone(), since: None, landing, waited: false })
+        Some(WaitingPlace { request: request.clone(), id, since: None, landing, waited: false })
     });
     waiting.extend(arrived);
-    waiting.retain_mut(|WaitingPlace { request: PlaceRequest { rig, ray, settings }, since, landing, waited }| {
+    waiting.retain_mut(|WaitingPlace { request: PlaceRequest { rig, ray, settings }, id, since, landing, waited }| {
         let Ok((document, selection, history, surface, has_mesh)) = rigs.get(*rig) else { return false };
-        let (rig, is_late) = (*rig, *waited);
-        let mut tell = |placement, refusal| placed.write(PlaceAnswer { rig, placement, waited: is_late, refusal });
+        let (rig, request, is_late) = (*rig, *id, *waited);
+        let mut tell = |placement, edit, refusal| {
+            placed.write(PlaceAnswer { rig, request, edit, placement, waited: is_late, refusal });
+        };
         if landing.would_discard(history) {
-            tell(Placement::Nothing, Some(PlaceRefusal::Undone));
+            tell(Placement::Nothing, None, Some(PlaceRefusal::Undone));
             return false;
         }
         let Answer::Now(surface) = answer(since, has_mesh, surface) else {
@@ -126,10 +133,8 @@ pub(super) fn place(
             return true;
         };
         let PlacedJoint { placement, parent, rest } = joint_at(document, selection, surface, ray, *settings);
-        if let Some(position) = rest {
-            edits.write(EditRequest::operation(rig, Operation::Place { position, parent }));
-        }
-        tell(placement, None);
+        let edit = rest.map(|position| edits.write(EditRequest::operation(rig, Operation::Place { position, parent })));
+        tell(placement, edit, None);
         false
     });
 }

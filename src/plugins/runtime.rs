@@ -22,6 +22,8 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use bevy::{math::Affine3A, prelude::*};
 
+#[cfg(feature = "cli")]
+pub(crate) use self::systems::is_same_place;
 pub(crate) use self::{despawn::despawn_nodes, systems::is_near};
 pub use self::{
     hand_over::{HandOver, OutsideTransform},

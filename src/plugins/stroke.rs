@@ -10,6 +10,7 @@ mod plan;
 use std::collections::{BTreeMap, BTreeSet};
 
 use bevy::{
+    ecs::message::MessageId,
     prelude::*,
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
 };
@@ -83,6 +84,10 @@ pub struct StrokeRequest {
 pub struct StrokeDone {
     /// The rig.
     pub rig: Entity,
+    /// Request that is answered.
+    pub request: MessageId<StrokeRequest>,
+    /// Edit that the stroke became, if any.
+    pub edit: Option<MessageId<EditRequest>>,
     /// Result of the stroke.
     pub result: StrokeResult,
 }
@@ -139,6 +144,7 @@ struct WaitingStrokes(Vec<WaitingStroke>);
 
 struct WaitingStroke {
     request: StrokeRequest,
+    id: MessageId<StrokeRequest>,
     /// Number of the state of the surface on which the stroke was drawn.
     since: Option<u64>,
     /// Task that computes its chain.
@@ -173,15 +179,15 @@ fn stroke(
     if waiting.0.is_empty() && requests.is_empty() {
         return;
     }
-    let arrived = requests.read().filter_map(|request| {
+    let arrived = requests.read_with_id().filter_map(|(request, id)| {
         let (.., history) = rigs.get(request.rig).ok()?;
         let landing = Landing::asked(history);
-        Some(WaitingStroke { request: request.clone(), since: None, chain: None, landing })
+        Some(WaitingStroke { request: request.clone(), id, since: None, chain: None, landing })
     });
     waiting.0.extend(arrived);
     // Only one stroke of a rig is processed at a time: the next may start on a joint that it adds.
     let mut busy: Vec<Entity> = Vec::new();
-    waiting.0.retain_mut(|WaitingStroke { request, since, chain, landing }| {
+    waiting.0.retain_mut(|WaitingStroke { request, id, since, chain, landing }| {
         let Ok(drawn) = rigs.get(request.rig) else { return false };
         let (rig, selection, entities, place, symmetry, tips, surface, meshes, history) = drawn;
         if busy.contains(&request.rig) {
@@ -200,14 +206,14 @@ fn stroke(
         };
         let result = match answer(since, meshes.is_some(), surface) {
             // A chain that waited would be in the way of the strokes after it.
-            _ if landing.would_discard(history) => Some(StrokeResult::Nothing(StrokeFailure::Undone)),
+            _ if landing.would_discard(history) => Some((StrokeResult::Nothing(StrokeFailure::Undone), None)),
             Answer::Wait => None,
-            Answer::Now(None) => Some(StrokeResult::Nothing(StrokeFailure::NoMesh)),
+            Answer::Now(None) => Some((StrokeResult::Nothing(StrokeFailure::NoMesh), None)),
             Answer::Now(Some(surface)) => {
                 let posed = posed_joints(rig, entities, place, &joints);
                 let scene = StrokeScene { rig, selection, symmetry, tips, surface, posed: &posed };
                 match act(request, &scene, found, &mut edits) {
-                    StrokeOutcome::Done(result) => Some(result),
+                    StrokeOutcome::Done(result, edit) => Some((result, edit)),
                     StrokeOutcome::Follows(task) => {
                         *chain = Some(task);
                         None
@@ -216,14 +222,14 @@ fn stroke(
             }
         };
         let is_waiting = result.is_none();
-        done.write_batch(result.map(|result| StrokeDone { rig: request.rig, result }));
+        done.write_batch(result.map(|(result, edit)| StrokeDone { rig: request.rig, request: *id, edit, result }));
         is_waiting
     });
 }
 
 /// Outcome of processing a stroke.
 enum StrokeOutcome {
-    Done(StrokeResult),
+    Done(StrokeResult, Option<MessageId<EditRequest>>),
     Follows(Task<FoundChain>),
 }
 
@@ -244,10 +250,10 @@ fn act(
     };
     match plan {
         StrokePlan::Ready { operation, result } => {
-            edits.write_batch(operation.map(|operation| EditRequest::operation(request.rig, *operation)));
-            StrokeOutcome::Done(result)
+            let edit = operation.map(|operation| edits.write(EditRequest::operation(request.rig, *operation)));
+            StrokeOutcome::Done(result, edit)
         }
-        StrokePlan::NeedsChain => StrokeOutcome::Done(StrokeResult::Nothing(StrokeFailure::NoChain)),
+        StrokePlan::NeedsChain => StrokeOutcome::Done(StrokeResult::Nothing(StrokeFailure::NoChain), None),
     }
 }
 
@@ -301,20 +307,20 @@ fn note_tips(
     mut rigs: Query<(&Selection, Option<&mut StrokeTips>)>,
 ) {
     let mut drawn: BTreeMap<Entity, BTreeSet<Uid>> = BTreeMap::new();
-    for PickAnswer { rig, joints } in picked.read() {
+    for PickAnswer { rig, joints, .. } in picked.read() {
         let Ok((_, Some(mut tips))) = rigs.get_mut(*rig) else { continue };
         if joints.iter().any(|joint| tips.contains(*joint)) {
             tips.0.retain(|tip| !joints.contains(tip));
         }
     }
-    for StrokeDone { rig, result } in done.read() {
+    for StrokeDone { rig, result, .. } in done.read() {
         let (StrokeResult::Chain { parent, .. }, Ok((selection, _))) = (result, rigs.get(*rig)) else { continue };
         // The parent is still selected if the chain was refused.
         if let Some(tip) = selection.active().filter(|active| Some(*active) != *parent) {
             drawn.entry(*rig).or_default().insert(tip);
         }
     }
-    for ChangeReport { rig, step } in reported.read() {
+    for ChangeReport { rig, step, .. } in reported.read() {
         if let Some(ReportedChain { parent, tip: Some(tip) }) = step.as_ref().ok().and_then(|step| step.chain)
             && Some(tip) != parent
         {

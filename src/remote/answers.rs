@@ -5,7 +5,7 @@ use std::{
     time::Instant,
 };
 
-use bevy::prelude::*;
+use bevy::{ecs::message::MessageId, prelude::*};
 use serde_json::{Value, json};
 
 use super::{Answer, RemoteServer, error::CallError};
@@ -16,12 +16,9 @@ use crate::{
     },
     plugins::{
         commands::BuildDone,
-        document::{EditRefusal, EditReport},
+        document::{EditRefusal, EditReport, EditRequest},
     },
-    rig::{
-        step::Commit,
-        update::{Change, Take},
-    },
+    rig::update::{Change, Take},
 };
 
 /// A call that waits for its answer.
@@ -33,8 +30,8 @@ pub(super) struct PendingCall {
 
 /// Event that answers a call.
 pub(super) enum AwaitedEvent {
-    /// A change: the step of that name, or one of the history without.
-    Edit { rig: Entity, step: Option<&'static str> },
+    /// A change.
+    Edit { request: MessageId<EditRequest> },
     /// A run of commands.
     Build { rig: Entity },
     /// A template that is loaded and built.
@@ -105,7 +102,7 @@ pub(super) fn answer_calls(
     let signs = std::mem::take(&mut server.signs);
     server.pending.retain_mut(|pending| {
         let answer = match &mut pending.awaited {
-            AwaitedEvent::Edit { rig, step } => edit_answer(*rig, *step, &edited, &refused),
+            AwaitedEvent::Edit { request } => edit_answer(*request, &edited, &refused),
             AwaitedEvent::Build { rig } => {
                 let report = done.iter().rfind(|done| done.rig == *rig).map(|done| &done.report);
                 report.map(|report| {
@@ -141,24 +138,12 @@ pub(super) fn answer_calls(
     });
 }
 
-fn edit_answer(
-    rig: Entity,
-    step: Option<&'static str>,
-    edited: &[&EditReport],
-    refused: &[&EditRefusal],
-) -> Option<Answer> {
-    let is_asked = |edited: &&&EditReport| {
-        edited.rig == rig
-            && match step {
-                Some(name) => edited.name == name,
-                None => matches!(edited.committed, Some(Commit::Undone(_) | Commit::Redone(_))),
-            }
-    };
-    if let Some(edited) = edited.iter().rfind(is_asked) {
+fn edit_answer(request: MessageId<EditRequest>, edited: &[&EditReport], refused: &[&EditRefusal]) -> Option<Answer> {
+    if let Some(edited) = edited.iter().find(|edited| edited.request == Some(request)) {
         let changed = edited.committed.is_some();
         return Some(Ok(json!({"changed": changed, "step": edited.name, "notes": edited.notes})));
     }
-    let refused = refused.iter().rfind(|refused| refused.rig == rig)?;
+    let refused = refused.iter().find(|refused| refused.request == Some(request))?;
     Some(Err(CallError::Refused(refused.reason.clone())))
 }
 

@@ -298,14 +298,14 @@ fn commands(processor: &Processor) -> Vec<Value> {
 
 fn edit(world: &mut World, params: EditParams) -> Result<AwaitedEvent, CallError> {
     let (rig, _) = document(world, &params.rig)?;
-    let (change, step) = match (params.edits, params.history) {
-        (Some(edits), None) => (Change::Do(Operation::Named { name: REMOTE_EDIT, edits }), Some(REMOTE_EDIT)),
-        (None, Some(History::Undo)) => (Change::Undo, None),
-        (None, Some(History::Redo)) => (Change::Redo, None),
+    let change = match (params.edits, params.history) {
+        (Some(edits), None) => Change::Do(Operation::Named { name: REMOTE_EDIT, edits }),
+        (None, Some(History::Undo)) => Change::Undo,
+        (None, Some(History::Redo)) => Change::Redo,
         _ => return Err(CallError::NotTogether("give either `edits` or `history`")),
     };
-    world.write_message(EditRequest { rig, change });
-    Ok(AwaitedEvent::Edit { rig, step })
+    let request = world.resource_mut::<Messages<EditRequest>>().write(EditRequest { rig, change });
+    Ok(AwaitedEvent::Edit { request })
 }
 
 fn build(world: &mut World, name: &RigName, step: BuildStep) -> Result<StartedCall, CallError> {

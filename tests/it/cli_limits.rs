@@ -9,7 +9,10 @@ use rigsmith::{
 };
 use serde_json::Value;
 
-use crate::{cli::explained, cli_outputs::rigsmith};
+use crate::{
+    cli::explained,
+    cli_outputs::{json, rigsmith},
+};
 
 const BOX: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
 const GESTURES: &str = "[Click((0.2, 0.2)), Stroke(points: [(0.1, 0.1), (0.1, 0.2), (0.1, 0.4)])]";
@@ -176,6 +179,30 @@ fn what_is_told_has_limits() {
     let missing = format!("{}.obj", "a".repeat(100));
     let (code, said) = run(&["info", &missing, "--limit", "message=60"]);
     assert!(code == 1 && said.len() < 100 && said.contains('…'), "{said}");
+}
+
+/// Errors in lists for programs have the limit of messages, too.
+#[test]
+fn errors_in_lists_are_short() {
+    let folder = folder();
+    let long = "x".repeat(100_000);
+    let rig = |joint: String| format!("(format: 2, name: \"n\", joints: [({joint})])");
+    for (name, text) in [
+        ("label.rig.ron", rig(format!("label: \"{long}\", parent: \"{long}y\""))),
+        ("module.rig.ron", rig(format!("label: \"a\", tags: [Command(module: \"{long}\")]"))),
+        ("long.ron", format!("[SelectLabel(\"{long}\")]")),
+    ] {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    for (args, list, key) in [
+        (&["format", "label.rig.ron", "tags.rig.ron", "--check"][..], "files", "error"),
+        (&["sketch", "b.obj", "long.ron", "-o", "o.rig.ron"], "gestures", "message"),
+        (&["build", "module.rig.ron"], "commands", "error"),
+    ] {
+        let (_, told) = json(folder.path(), args);
+        let error = told[list][0][key].as_str().unwrap_or_else(|| panic!("{args:?}: {told:.600}"));
+        assert!(error.len() < 5_000 && error.contains('…'), "{args:?}: {} bytes", error.len());
+    }
 }
 
 /// No build is nothing to wait for.

@@ -7,6 +7,7 @@ use std::{
     process::{Child, Command, Stdio},
     sync::mpsc::{Receiver, channel},
     thread::spawn,
+    time::Duration,
 };
 
 use rigsmith::{
@@ -162,6 +163,30 @@ fn a_character_that_could_not_be_written_is_written_as_soon_as_it_can_be() {
     assert!(crate::cli::explained(&told).contains("create it or choose another"), "{told}");
     // The folder is there again, and nobody has saved the template since. The same error is not told again meanwhile.
     fs::create_dir(at("out")).unwrap();
+    let told = watch.next();
+    assert!(told["ok"] == true && at("out/a.glb").exists(), "{told}");
+    assert!(watch.ended());
+}
+
+/// What cannot be written for the same reason as before is not read and built again meanwhile: a part that is missing for a
+/// while is told only once there is a place to write to.
+#[test]
+fn a_character_is_made_again_only_when_it_may_be_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let part = "(format: 2, name: \"q\", kind: \"part\", joints: [(label: \"x\")])";
+    fs::write(at("p.rig.ron"), part).unwrap();
+    let host = "(format: 2, name: \"n\", joints: [(label: \"a\")], parts: [(part: \"p.rig.ron\", name: \"inner\")])";
+    fs::write(at("a.rig.ron"), host).unwrap();
+    let mut watch = Watch::start(folder.path(), "out/a.glb", "1");
+    let told = watch.next();
+    assert!(crate::cli::explained(&told).contains("create it or choose another"), "{told}");
+    fs::remove_file(at("p.rig.ron")).unwrap();
+    assert!(watch.heard.recv_timeout(Duration::from_millis(2500)).is_err());
+    fs::create_dir(at("out")).unwrap();
+    let told = watch.next();
+    assert!(crate::cli::explained(&told).contains("p.rig.ron"), "{told}");
+    save_whole(&at("p.rig.ron"), part);
     let told = watch.next();
     assert!(told["ok"] == true && at("out/a.glb").exists(), "{told}");
     assert!(watch.ended());

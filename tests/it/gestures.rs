@@ -210,6 +210,23 @@ fn absurd_numbers_of_joints_make_few() {
     assert!(places(&bench).iter().all(|place| place.is_finite()));
 }
 
+/// Joints that are moved or scaled far out of a model would be at no finite place, which no other command takes.
+#[test]
+fn gestures_out_of_all_proportion_are_refused() {
+    let mut bench = bench(boxes(&ONE_BOX));
+    let answers = make(
+        &mut bench,
+        "[Click((0.0, 1.0)), MoveTo((1e38, 0, 0)), Move((0, -1e6)), Insert((3e38, 0)), Scale(1e38), Scale(0), \
+         MoveTo((0.1, 1.5, 0)), Scale(2)]",
+    );
+    for refused in &answers[1..6] {
+        let is_told = refused.message.contains("out of all proportion") || refused.message.contains("flattens");
+        assert!(!refused.done && is_told, "{refused:?}");
+    }
+    assert!(answers[6].done && answers[7].done, "{answers:?}");
+    assert_near(places(&bench)[0], [0.1, 1.5, 0.0]);
+}
+
 #[test]
 fn picking_takes_the_nearest_then_the_next() {
     let mut bench = bench(boxes(&ONE_BOX));

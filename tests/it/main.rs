@@ -98,6 +98,7 @@ mod face_landmarks;
 mod face_symmetry;
 mod face_teeth;
 mod face_units;
+mod failed_saves;
 mod files;
 mod files_faults;
 mod files_kill;
@@ -134,6 +135,7 @@ mod fuzz_skin;
 mod fuzz_template;
 mod fuzz_whole;
 mod generate;
+mod gesture_answers;
 #[cfg(feature = "editor")]
 mod gesture_counts;
 mod gestures;

@@ -15,7 +15,7 @@ use crate::{
     headless::{Workbench, posing::PoseError},
     mesh::model::Model,
     rig::{
-        Rig, Uid,
+        Rig, Uid, UidSource,
         animation::{
             RigClip,
             file_clip::{motion_of, numbered_clip, own_joints, rig_clip},
@@ -223,11 +223,21 @@ fn on_joints(args: &AnimateArgs, clip: &RigClip, rig: &Rig, whole: &Workbench) -
     Ok(rig_clip(rig, &clip.name, &baked, &joints))
 }
 
-/// Adds the clips of a file to the document in one step; returns them as the document has them.
+/// Adds the clips of a file to the document; returns them as the document has them. Nobody takes them back: a step of the history
+/// and its request would hold them twice more.
 fn add_all(bench: &mut Workbench, clips: Vec<RigClip>) -> Result<Vec<RigClip>, Failure> {
     let before = bench.rig().clips().len();
     if !clips.is_empty() {
-        bench.operate(Operation::Clips(ClipOperation::AddAll(clips)))?;
+        let operation = Operation::Clips(ClipOperation::AddAll(clips));
+        let (entity, app) = (bench.rig_entity(), bench.app_mut());
+        let world = app.world_mut();
+        let rig = world.get_mut::<Rig>(entity).map(|mut rig| std::mem::take(&mut *rig)).unwrap_or_default();
+        let changed = operation.run_on(rig, &mut world.resource_mut::<UidSource>());
+        let (rig, _) = changed.map_err(|error| Failure::Input(Box::new(error)))?;
+        if let Some(mut document) = world.get_mut::<Rig>(entity) {
+            *document = rig;
+        }
+        app.update();
     }
     Ok(bench.rig().clips()[before..].to_vec())
 }
@@ -412,9 +422,10 @@ fn describe_map(map: &JointMap, motion: &Motion, rig: &Rig, report: &mut Report)
 
 #[cfg(test)]
 mod tests {
-    use bevy::diagnostic::FrameCount;
+    use bevy::{diagnostic::FrameCount, prelude::Messages};
 
     use super::*;
+    use crate::plugins::{document::EditRequest, history::RigHistory};
 
     #[test]
     fn clips_of_a_file_take_one_frame_of_the_app() {
@@ -429,5 +440,10 @@ mod tests {
         let Ok(added) = add_all(&mut bench, (0..300).map(clip).collect()) else { panic!("no clip is refused") };
         assert_eq!(frames(&mut bench) - before, 1);
         assert_eq!((added.len(), added[299].name.as_str()), (300, "walk 300"));
+        // Nothing holds them beside the document.
+        let rig = bench.rig_entity();
+        let world = bench.app_mut().world();
+        assert!(world.resource::<Messages<EditRequest>>().is_empty());
+        assert!(world.get::<RigHistory>(rig).is_some_and(|history| history.steps().0.is_empty()));
     }
 }

@@ -1,10 +1,12 @@
 //! Rigs at rest: where nothing is written to a rig without commands, its nodes are told and saved without an app, whose
-//! entities take several times the memory. Frames move nothing of such a rig. One in a pose, or with uneven scales, is built
-//! before its app begins.
+//! entities take several times the memory. Frames move nothing of such a rig. One in a pose is built before its app begins.
 
 use std::sync::Arc;
 
-use bevy::prelude::{GlobalTransform, Transform, Vec3};
+use bevy::{
+    math::Affine3A,
+    prelude::{GlobalTransform, Transform},
+};
 
 use super::{PoseArgs, tell_nodes};
 use crate::{
@@ -13,24 +15,23 @@ use crate::{
         Workbench,
         posing::{PoseError, PosedNode},
     },
-    plugins::{commands::NamedProgramError, surface::RigMesh},
+    plugins::{commands::NamedProgramError, runtime::is_same_place, surface::RigMesh},
     processor::{Builder, Modules},
     rig::{BuiltRig, Rig},
     solve::program::{CompileOptions, RigProgram, RigState},
 };
 
 /// True if the command writes no values and binds no meshes, and the rig has neither commands nor a pose: whatever frames
-/// pass then, nothing moves. Unevenly scaled joints are left to an app, which corrects how Bevy shears what is below them.
+/// pass then, nothing moves.
 pub(super) fn is_at_rest(args: &PoseArgs, own: &[RigMesh], rig: &Rig) -> bool {
     let steps = &args.steps;
     let is_plain = steps.set.is_empty() && steps.switches.is_empty();
     is_plain && args.meshes.is_empty() && own.is_empty() && is_still(rig)
 }
 
-/// True if a rig has neither commands nor a pose, and no joint is scaled unevenly: its entities are where its joints rest.
+/// True if a rig has neither commands nor a pose: its entities are where its joints rest.
 pub(in crate::cli) fn is_still(rig: &Rig) -> bool {
-    let is_even = |scale: Vec3| scale == Vec3::splat(scale.x);
-    !rig.has_tags() && rig.pose().is_empty() && rig.walk().all(|joint| is_even(joint.data.rest.scale))
+    !rig.has_tags() && rig.pose().is_empty()
 }
 
 /// True if the command asks for no node by its name, for no mesh and no picture, and the rig has no commands: nothing then asks
@@ -94,13 +95,18 @@ fn tell(rig: &Rig, built: &BuiltRig, report: &mut Report) -> Result<(), PoseErro
             scale: base.scale,
         }));
     }
+    let height = state.program().rest_height();
     let posed = built.nodes.iter().zip(&shown).filter_map(|(node, shown)| {
         let place = state.global(node.uid)?;
+        // Below an unevenly scaled joint matrices shear, which an app corrects.
+        let (now, wanted) = (shown.affine(), place.affine());
+        let shown = if is_same_place(&now, &wanted, height) { now } else { wanted };
         let (translation, rotation, scale) = (place.translation, place.rotation, place.scale);
         Some(PosedNode {
             node: node.clone(),
             parent: node.parent.map(|parent| built.nodes[parent].uid),
-            entity: shown.compute_transform(),
+            // The rig is where the world is.
+            entity: GlobalTransform::from(Affine3A::IDENTITY * shown).compute_transform(),
             program: Transform { translation, rotation, scale },
         })
     });

@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use bevy::prelude::*;
+use bevy::{ecs::message::MessageId, prelude::*};
 
 use super::work::LOAD;
 use crate::{
@@ -29,7 +29,7 @@ pub(super) struct LoadSteps {
 
 /// Load that was asked for.
 pub(super) struct PendingLoad {
-    pub rig: Entity,
+    pub request: MessageId<EditRequest>,
     /// File of the template; `None` for one that comes with Rigsmith.
     pub template: Option<PathBuf>,
     /// The template as it was read.
@@ -62,28 +62,34 @@ pub(super) fn follow_loads(
     mut refused: MessageReader<EditRefusal>,
     mut commands: Commands,
 ) {
-    for EditReport { rig, name, committed, .. } in reports.read() {
-        let (rig, is_load) = (*rig, *name == LOAD);
+    for EditReport { rig, request, name, committed, .. } in reports.read() {
+        let (rig, request, is_load) = (*rig, *request, *name == LOAD);
         if let Some(commit) = committed.clone().filter(|_| is_load) {
-            commands.queue(move |world: &mut World| cross(world, rig, &commit));
+            commands.queue(move |world: &mut World| cross(world, rig, request, &commit));
         } else if is_load {
-            commands.queue(move |world: &mut World| settle(world, rig));
+            commands.queue(move |world: &mut World| settle(world, rig, request));
         }
     }
-    for rig in refused.read().map(|refusal| refusal.rig) {
+    for request in refused.read().map(|refusal| refusal.request) {
         commands.queue(move |world: &mut World| {
-            let mut loads = world.resource_mut::<LoadSteps>();
-            loads.pending.take_if(|pending| pending.rig == rig);
+            world.resource_mut::<LoadSteps>().take_pending(request);
         });
     }
 }
 
-fn cross(world: &mut World, rig: Entity, commit: &Commit) {
+impl LoadSteps {
+    /// The load that was asked for by this request; any other one stays.
+    fn take_pending(&mut self, request: Option<MessageId<EditRequest>>) -> Option<PendingLoad> {
+        self.pending.take_if(|pending| Some(pending.request) == request)
+    }
+}
+
+fn cross(world: &mut World, rig: Entity, request: Option<MessageId<EditRequest>>, commit: &Commit) {
     let now = followed(world, rig);
     let mut loads = world.resource_mut::<LoadSteps>();
     let step = commit.step();
     if let Commit::Done(_) = commit {
-        let Some(pending) = loads.pending.take_if(|pending| pending.rig == rig) else { return };
+        let Some(pending) = loads.take_pending(request) else { return };
         let after = FollowState { template: pending.template, base: Some(pending.base), source: None };
         loads.fit = pending.mesh.map(|mesh| (rig, mesh, step.clone()));
         // There is one document at a time.
@@ -112,9 +118,9 @@ fn cross(world: &mut World, rig: Entity, commit: &Commit) {
 }
 
 /// Follows a template that the rig was equal to already.
-fn settle(world: &mut World, rig: Entity) {
+fn settle(world: &mut World, rig: Entity, request: Option<MessageId<EditRequest>>) {
     let mut loads = world.resource_mut::<LoadSteps>();
-    let Some(pending) = loads.pending.take_if(|pending| pending.rig == rig) else { return };
+    let Some(pending) = loads.take_pending(request) else { return };
     set(world, rig, FollowState { template: pending.template, base: Some(pending.base), source: None });
     world.write_message(Notice::done(pending.told));
     if let Some(mesh) = pending.mesh {
@@ -152,7 +158,7 @@ pub(super) fn watch_fits(
     mut loads: ResMut<LoadSteps>,
     mut commands: Commands,
 ) {
-    for FitAnswer { mesh, result } in answers.read() {
+    for FitAnswer { mesh, result, .. } in answers.read() {
         let Some((rig, _, step)) = loads.fit.take_if(|(_, of, _)| of == mesh) else { continue };
         let is_last =
             histories.get(rig).is_ok_and(|history| history.last().is_some_and(|last| Arc::ptr_eq(last, &step)));

@@ -409,8 +409,9 @@ fn put(world: &mut World, rig: Entity, request: LibraryRequest, mut landing: Lan
     let template = request.place.path().map(std::path::Path::to_path_buf);
     let joints = counted(base.rig.len(), "joint", "joints");
     let told = format!("Loaded {name}: {joints}; Ctrl+Z takes it back");
-    world.resource_mut::<LoadSteps>().pending = Some(PendingLoad { rig, template, base, mesh, told });
-    world.write_message(EditRequest::operation(rig, Operation::Named { name: LOAD, edits }));
+    let edit = EditRequest::operation(rig, Operation::Named { name: LOAD, edits });
+    let request = world.resource_mut::<Messages<EditRequest>>().write(edit);
+    world.resource_mut::<LoadSteps>().pending = Some(PendingLoad { request, template, base, mesh, told });
 }
 
 /// The mesh with the most points, which is the body: eyes and clothes lie in it or on it.

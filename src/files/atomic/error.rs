@@ -92,7 +92,7 @@ pub enum SaveError {
     NoSpace {
         /// The path as given.
         path: PathBuf,
-        /// Size of the content in bytes.
+        /// Size of the content in bytes; of a set that of all files that are not there yet.
         bytes: u64,
         /// Error of the operating system.
         source: io::Error,

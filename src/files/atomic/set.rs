@@ -133,7 +133,8 @@ pub fn save_set(disk: &dyn Disk, set: &FileSet) -> Result<(), SaveError> {
             // The next save finds the record and clears up.
             record.leave();
         }
-        return Err(error);
+        let all = set.bytes.len() + missing.iter().map(|(_, bytes)| bytes.len()).sum::<usize>();
+        return Err(of_all(error, all));
     }
     // The old main file may come back until the disk confirms the rename, so its companions stay until then.
     let done = target.confirm(disk);
@@ -141,6 +142,14 @@ pub fn save_set(disk: &dyn Disk, set: &FileSet) -> Result<(), SaveError> {
         record.leave();
     }
     done
+}
+
+/// Error of a save of so many bytes in all.
+fn of_all(error: SaveError, bytes: usize) -> SaveError {
+    match error {
+        SaveError::NoSpace { path, source, .. } => SaveError::NoSpace { path, bytes: bytes as u64, source },
+        error => error,
+    }
 }
 
 /// Puts the missing companions in place, then the main file; lists in `placed` the companions to remove after a

@@ -67,7 +67,7 @@ pub(super) fn throw_over(
                 commands.write_message(SwitchedOver { rig, frames, keys, notes });
             }
             Err(error) => {
-                commands.write_message(EditRefusal { rig, reason: error.into() });
+                commands.write_message(EditRefusal { rig, request: None, reason: error.into() });
             }
         }
     }

@@ -3,7 +3,7 @@
 //! Commands know no mesh, so they give shapes a size that follows from bones. Once a rig has meshes, the shapes are measured on
 //! them at rest, in a background task.
 
-use std::sync::Arc;
+use std::{collections::HashMap, hash::Hash, sync::Arc};
 
 use bevy::{
     math::Affine3A,
@@ -119,12 +119,21 @@ pub(super) fn measure_shapes(
 
 /// Gives controls their factors.
 fn write(found: &[(Uid, f32)], entities: &BuiltEntities, factors: &Query<&ShapeFactor>, commands: &mut Commands) {
-    for (uid, entity) in entities.iter() {
-        let factor = found.iter().find(|(known, _)| *known == uid).map_or(1.0, |(_, factor)| *factor);
+    let of_each = factor_of_each(found, entities.iter().map(|(uid, _)| uid));
+    for ((_, entity), factor) in entities.iter().zip(of_each) {
         if factors.get(entity).map_or(1.0, |known| known.0) != factor {
             commands.entity(entity).try_insert(ShapeFactor(factor));
         }
     }
+}
+
+/// Factor of each node, in their order; 1 for those that are not among the found ones.
+fn factor_of_each<K: Copy + Eq + Hash>(
+    found: &[(K, f32)],
+    nodes: impl Iterator<Item = K>,
+) -> impl Iterator<Item = f32> {
+    let found: HashMap<K, f32> = found.iter().copied().collect();
+    nodes.map(move |node| found.get(&node).copied().unwrap_or(1.0))
 }
 
 /// The surface of meshes at rest, in the rig's space.
@@ -157,4 +166,46 @@ pub fn shape_factors(built: &BuiltRig, surface: &Surface) -> Vec<(Uid, f32)> {
         }
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{cell::Cell, hash::Hasher};
+
+    use super::*;
+
+    /// Uid that counts how often it is compared.
+    #[derive(Clone, Copy)]
+    struct CountedUid<'a>(u64, &'a Cell<usize>);
+
+    impl PartialEq for CountedUid<'_> {
+        fn eq(&self, other: &Self) -> bool {
+            self.1.set(self.1.get() + 1);
+            self.0 == other.0
+        }
+    }
+
+    impl Eq for CountedUid<'_> {}
+
+    impl Hash for CountedUid<'_> {
+        fn hash<H: Hasher>(&self, state: &mut H) {
+            self.0.hash(state);
+        }
+    }
+
+    #[test]
+    fn factors_of_many_controls_are_found_at_once() {
+        let compared = |count: u64| {
+            let compared = Cell::new(0);
+            let found: Vec<_> = (0..count).map(|number| (CountedUid(2 * number, &compared), 2.0)).collect();
+            let nodes = (0..2 * count).map(|number| CountedUid(number, &compared));
+            for (number, factor) in factor_of_each(&found, nodes).enumerate() {
+                assert_eq!(factor, if number % 2 == 0 { 2.0 } else { 1.0 }, "{number}");
+            }
+            compared.get()
+        };
+        let (few, many) = (compared(1000), compared(4000));
+        // Once for each found one, and now and then for two of one hash.
+        assert!((1000..1500).contains(&few) && (4000..6000).contains(&many), "{few} and {many}");
+    }
 }

@@ -241,7 +241,7 @@ pub(super) fn adopt_writes(
         let mut outcome = trial.finish();
         for reason in outcome.take_refused(&mut told) {
             warn!("{reason}");
-            refused.write(EditRefusal { rig: rig_entity, reason: reason.into() });
+            refused.write(EditRefusal { rig: rig_entity, request: None, reason: reason.into() });
             has_told = true;
         }
         if outcome.respawn {

@@ -58,7 +58,7 @@ impl RefusalLog {
         let has_told = !fresh.is_empty();
         for reason in fresh {
             warn!("{reason}");
-            send(EditRefusal { rig, reason: reason.into() });
+            send(EditRefusal { rig, request: None, reason: reason.into() });
         }
         has_told
     }

@@ -110,7 +110,8 @@ fn strengths_of(rig: &Rig, mesh: Uid) -> BTreeMap<String, f32> {
 }
 
 /// Poses faces as they are asked for. A preview is computed in the background, and so is what is asked for while one is
-/// computed; with [`BackgroundPosing`], everything is. Without it everything else shows in the same frame.
+/// computed; with [`BackgroundPosing`], everything is. Without it everything else shows in the same frame, or in the next one where
+/// it follows a step of the same frame.
 pub(super) fn express(
     mut commands: Commands,
     mut requests: MessageReader<ExpressRequest>,
@@ -130,8 +131,7 @@ pub(super) fn express(
     awaited.landed.clear();
     let mut asked: Vec<(ExpressRequest, bool)> = Vec::new();
     for (.., posing) in &mut meshes {
-        let landed = posing.map(|mut posing| posing.bypass_change_detection().land()).unwrap_or_default();
-        asked.extend(landed.into_iter().map(|request| (request, true)));
+        asked.extend(posing.map(|mut posing| posing.bypass_change_detection().land()).unwrap_or_default());
     }
     asked.extend(requests.read().map(|request| (request.clone(), false)));
     for (number, (request, has_waited)) in asked.iter().enumerate() {
@@ -185,7 +185,7 @@ pub(super) fn express(
         let follows_step = awaited.landed.contains(&rig_entity);
         let may_end_here = !*preview && !follows_step && posing.is_running();
         let ends_where_it_began = may_end_here && strengths_of(&settled, mesh.uid) == *strengths;
-        let is_computed_apart = *preview || *has_waited || follows_step || background.is_some();
+        let is_computed_apart = *preview || *has_waited || background.is_some();
         let mut edits = match posing.posed(parts, strengths).filter(|_| !follows_step) {
             Some(poses) => expression_edits(&settled, parts, poses),
             None if is_replaced => continue,
@@ -197,6 +197,10 @@ pub(super) fn express(
             }
             None if is_computed_apart => {
                 posing.start(parts, mix, request.clone());
+                continue;
+            }
+            None if follows_step => {
+                posing.hold(parts, parts.fitted.pose(&mix), request.clone());
                 continue;
             }
             None => expression_edits(&settled, parts, &parts.fitted.pose(&mix)),

@@ -21,8 +21,8 @@ use crate::algo::face::expression::{BonePose, Mix};
 /// Mark of an app whose frames compute no poses of expressions, as that of a window: each is computed in the background, and its
 /// step of the history is made when it is there. Undo and redo wait for it.
 ///
-/// Without it an expression that is no preview shows in the frame in which it is asked for, so that the results of an app that
-/// waits for nothing do not depend on time.
+/// Without it an expression that is no preview shows in the frame in which it is asked for, or in the next one where another step of
+/// that frame comes before it, so that the results of an app that waits for nothing do not depend on time.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct BackgroundPosing;
 
@@ -44,15 +44,23 @@ struct LastPose {
 }
 
 struct RunningPose {
-    task: Task<Vec<BonePose>>,
+    work: PoseWork,
     parts: Weak<PreparedParts>,
     request: ExpressRequest,
     /// Requests that came meanwhile, in their order.
     queue: Vec<ExpressRequest>,
 }
 
+/// Poses of a request.
+enum PoseWork {
+    /// They are computed in the background.
+    Task(Task<Vec<BonePose>>),
+    /// They are known, and shown in the next frame.
+    Ready(Vec<BonePose>),
+}
+
 impl FacePosing {
-    /// True while a pose is computed.
+    /// True while a pose is computed, or waits for the next frame.
     pub fn is_running(&self) -> bool {
         self.running.is_some()
     }
@@ -79,7 +87,14 @@ impl FacePosing {
     pub(super) fn start(&mut self, parts: &Arc<PreparedParts>, mix: Mix, request: ExpressRequest) {
         let of_task = parts.clone();
         let task = AsyncComputeTaskPool::get().spawn(async move { of_task.fitted.pose(&mix) });
-        self.running = Some(RunningPose { task, parts: Arc::downgrade(parts), request, queue: Vec::new() });
+        let (work, parts) = (PoseWork::Task(task), Arc::downgrade(parts));
+        self.running = Some(RunningPose { work, parts, request, queue: Vec::new() });
+    }
+
+    /// Holds the known pose of a request until the next frame.
+    pub(super) fn hold(&mut self, parts: &Arc<PreparedParts>, poses: Vec<BonePose>, request: ExpressRequest) {
+        let (work, parts) = (PoseWork::Ready(poses), Arc::downgrade(parts));
+        self.running = Some(RunningPose { work, parts, request, queue: Vec::new() });
     }
 
     /// Lets a request wait for the pose that is being computed, in place of a preview that waits, or of the last request where
@@ -96,13 +111,21 @@ impl FacePosing {
         self.running = None;
     }
 
-    /// Takes over a pose that is computed. Returns its request and those that waited for it.
-    pub(super) fn land(&mut self) -> Vec<ExpressRequest> {
-        let Some(poses) = self.running.as_mut().and_then(|running| check_ready(&mut running.task)) else {
-            return Vec::new();
+    /// Takes over a pose that is known. Returns its request and those that waited for it, each with true if they waited for the
+    /// background.
+    pub(super) fn land(&mut self) -> Vec<(ExpressRequest, bool)> {
+        let Some(RunningPose { work, parts, request, queue }) = self.running.take() else { return Vec::new() };
+        let (poses, is_of_background) = match work {
+            PoseWork::Ready(poses) => (poses, false),
+            PoseWork::Task(mut task) => match check_ready(&mut task) {
+                Some(poses) => (poses, true),
+                None => {
+                    self.running = Some(RunningPose { work: PoseWork::Task(task), parts, request, queue });
+                    return Vec::new();
+                }
+            },
         };
-        let Some(RunningPose { parts, request, queue, .. }) = self.running.take() else { return Vec::new() };
         self.last = Some(LastPose { parts, strengths: request.strengths.clone(), poses });
-        std::iter::once(request).chain(queue).collect()
+        std::iter::once(request).chain(queue).map(|request| (request, is_of_background)).collect()
     }
 }

@@ -4,21 +4,21 @@ use bevy::{ecs::system::SystemParam, prelude::*};
 
 use super::{
     error::GestureError,
-    script::{GestureScript, ScriptedRig},
+    script::{AwaitedAnswer, GestureScript, ScriptedRig},
     selection_run::told_selection,
 };
 use crate::{
     algo::{placement::Placement, stroke::StrokeNote},
     plugins::{
         document::{ChangeReport, EditRefusal, EditReport},
-        fit::{FIT_AROUND, FitAnswer},
+        fit::FitAnswer,
         history::quoted_name,
         picking::PickAnswer,
         placement::{PlaceAnswer, PlaceRefusal},
         stroke::{StrokeDone, StrokeResult},
         surface::SkinOf,
     },
-    rig::{Rig, Uid, step::Commit},
+    rig::{Rig, Uid},
 };
 
 /// Readers of the answers.
@@ -35,11 +35,11 @@ pub(super) struct Answers<'w, 's> {
 }
 
 impl Answers<'_, '_> {
-    /// Reads the answers to the last gestures of scripts.
+    /// Reads the answers to the last gestures of scripts. Answers to requests of other code are none of them.
     pub(super) fn collect(&mut self, scripts: &mut Query<ScriptedRig>) {
-        for PickAnswer { rig: entity, joints } in self.picked.read() {
+        for PickAnswer { rig: entity, request, joints } in self.picked.read() {
             let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
-            if script.take_selection(joints, rig) || !script.pending {
+            if script.take_selection(*request, joints, rig) || !script.awaits(AwaitedAnswer::Pick(*request)) {
                 continue;
             }
             if joints.is_empty() {
@@ -47,21 +47,27 @@ impl Answers<'_, '_> {
             } else {
                 script.say(told_selection(joints, rig));
             }
-            script.pending = false;
+            script.finish(None);
         }
-        for PlaceAnswer { rig: entity, placement, refusal, .. } in self.placed.read() {
+        for PlaceAnswer { rig: entity, request, edit, placement, refusal, .. } in self.placed.read() {
             let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
+            if !script.awaits(AwaitedAnswer::Place(*request)) {
+                continue;
+            }
             script.note_added(rig);
             script.tell_placement(placement, *refusal);
-            script.pending = false;
+            script.finish(*edit);
         }
-        for ChangeReport { rig: entity, step } in self.reported.read() {
+        for ChangeReport { rig: entity, request, step } in self.reported.read() {
             if let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) {
-                script.take_report(step, rig);
+                script.take_report(*request, step, rig);
             }
         }
-        for StrokeDone { rig: entity, result } in self.drawn.read() {
+        for StrokeDone { rig: entity, request, edit, result } in self.drawn.read() {
             let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
+            if !script.awaits(AwaitedAnswer::Stroke(*request)) {
+                continue;
+            }
             script.note_added(rig);
             match result {
                 StrokeResult::Nothing(why) => script.fail(&why.clone().into()),
@@ -73,37 +79,39 @@ impl Answers<'_, '_> {
                     script.say(told_chain(rig, chain.joints.len(), *parent, &chain.notes));
                 }
             }
-            script.pending = false;
+            script.finish(*edit);
         }
-        for FitAnswer { mesh, result } in self.fitted.read() {
+        for FitAnswer { mesh, edit, result } in self.fitted.read() {
             let Ok(SkinOf(rig)) = self.meshes.get(*mesh) else { continue };
             let Ok((_, mut script, ..)) = scripts.get_mut(*rig) else { continue };
-            // The edit of a fit answers for it.
-            if let Err(failure) = result {
-                script.fail(&failure.clone().into());
-                script.pending = false;
-            }
-        }
-        // Joints around a moved one are fitted again by themselves, in answer to no gesture.
-        let follows =
-            |edited: &EditReport| edited.name == FIT_AROUND && matches!(edited.committed, Some(Commit::Done(_)));
-        let own = |edited: &&EditReport| !edited.preview && !follows(edited);
-        for EditReport { rig: entity, name, committed, .. } in self.edited.read().filter(own) {
-            let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
-            if script.pending && script.is_answered_by(committed.as_ref()) {
-                script.note_added(rig);
-                script.say(told_step(name, rig.len()));
-                script.pending = false;
-            }
-        }
-        for EditRefusal { rig: entity, reason } in self.refused.read() {
-            let Ok((_, mut script, ..)) = scripts.get_mut(*entity) else { continue };
-            if script.refused_changes > 0 {
-                script.refused_changes -= 1;
+            if !script.awaits(AwaitedAnswer::Fit(*mesh)) {
                 continue;
             }
-            script.fail(&reason.clone().into());
-            script.pending = false;
+            match (result, edit) {
+                (Err(failure), _) => {
+                    script.fail(&failure.clone().into());
+                    script.finish(None);
+                }
+                // The edit of a fit answers for it.
+                (Ok(_), Some(edit)) => script.awaited = Some(AwaitedAnswer::Edit(*edit)),
+                (Ok(_), None) => script.finish(None),
+            }
+        }
+        for EditReport { rig: entity, request, name, .. } in self.edited.read() {
+            let (Ok((_, mut script, rig, ..)), Some(request)) = (scripts.get_mut(*entity), request) else { continue };
+            if script.awaits(AwaitedAnswer::Edit(*request)) {
+                script.note_added(rig);
+                script.say(told_step(name, rig.len()));
+                script.finish(None);
+            }
+        }
+        for EditRefusal { rig: entity, request, reason } in self.refused.read() {
+            let (Ok((_, mut script, ..)), Some(request)) = (scripts.get_mut(*entity), request) else { continue };
+            // The edit of a click or a stroke is refused after these have told what they met.
+            if script.awaited == Some(AwaitedAnswer::Edit(*request)) {
+                script.fail(&reason.clone().into());
+                script.finish(None);
+            }
         }
     }
 }

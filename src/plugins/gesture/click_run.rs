@@ -7,7 +7,7 @@
 //! where the joints are. A run has at most as many gestures as the rig has joints and groups: frames cost what these cost, and a
 //! list takes time in proportion to its length.
 
-use bevy::prelude::*;
+use bevy::{ecs::message::MessageId, prelude::*};
 
 use super::{
     Gesture, GestureScript,
@@ -61,6 +61,7 @@ impl RunRig<'_> {
 
 /// Change of a run that is requested.
 pub(super) struct RequestedChange {
+    request: MessageId<EditRequest>,
     /// Index of the answer that it completes.
     pub answer: usize,
     /// Chain of a stroke.
@@ -212,7 +213,7 @@ pub(super) fn carry_out(
             start = Some(found);
         }
         has_begun = true;
-        let Some(gesture) = script.begin_next(run.rig.len(), limits) else { continue };
+        let Some(gesture) = script.begin_next(run.rig.len(), run.surface, limits) else { continue };
         let (change, chain) = match (start, gesture) {
             (_, Gesture::Select(_)) => {
                 let Some(joint) = pick else { continue };
@@ -231,10 +232,12 @@ pub(super) fn carry_out(
         };
         joints.note(&change, run.symmetry.as_ref());
         state.note(&change);
-        if !matches!(change, Change::Select(_)) {
-            script.requested.push_back(RequestedChange { answer: script.answers.len() - 1, chain });
+        let is_answered = !matches!(change, Change::Select(_));
+        let request = edits.write(EditRequest { rig: run.entity, change });
+        if is_answered {
+            let answer = script.answers.len() - 1;
+            script.requested.push_back(RequestedChange { request, answer, chain });
         }
-        edits.write(EditRequest { rig: run.entity, change });
     }
     script.pending = !script.requested.is_empty();
     has_begun
@@ -268,9 +271,17 @@ impl GestureScript {
         }
     }
 
-    /// Completes the answer of the first gesture of a run whose change was requested.
-    pub(super) fn take_report(&mut self, step: &Result<ReportedStep, ChangeError>, rig: &Rig) {
-        let Some(RequestedChange { answer: number, chain }) = self.requested.pop_front() else { return };
+    /// Completes the answer of the gesture of a run that requested a change.
+    pub(super) fn take_report(
+        &mut self,
+        request: MessageId<EditRequest>,
+        step: &Result<ReportedStep, ChangeError>,
+        rig: &Rig,
+    ) {
+        // All but undone steps that waited come in their order.
+        let at = self.requested.iter().position(|change| change.request == request);
+        let requested = at.and_then(|at| self.requested.remove(at));
+        let Some(RequestedChange { answer: number, chain, .. }) = requested else { return };
         self.pending = !self.requested.is_empty();
         let Some(answer) = self.answers.get_mut(number) else { return };
         match step {
@@ -290,7 +301,6 @@ impl GestureScript {
             Err(reason) => {
                 answer.done = false;
                 answer.message = GestureError::from(reason.clone()).to_string();
-                self.refused_changes += 1;
             }
         }
     }

@@ -1,7 +1,10 @@
 //! Reasons why gestures have no effect.
 
-use crate::plugins::{
-    document::ChangeError, fit::FitFailure, limits::LimitError, placement::PlaceRefusal, stroke::StrokeFailure,
+use crate::{
+    plugins::{
+        document::ChangeError, fit::FitFailure, limits::LimitError, placement::PlaceRefusal, stroke::StrokeFailure,
+    },
+    rig::proportion::ProportionError,
 };
 
 /// Reason why a gesture had no effect; a sentence for people without its full stop.
@@ -31,6 +34,9 @@ pub(super) enum GestureError {
     /// The list has more gestures, or the stroke more points, than is taken.
     #[error(transparent)]
     Limit(#[from] LimitError),
+    /// The gesture would put joints out of all proportion to the model.
+    #[error(transparent)]
+    Proportion(#[from] ProportionError),
     /// The gesture is no operation on joints.
     #[error("this gesture changes no joint")]
     NoOperation,

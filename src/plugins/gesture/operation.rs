@@ -3,7 +3,11 @@
 use bevy::prelude::*;
 
 use super::Gesture;
-use crate::{algo::view::ViewPlane, plugins::document::SelectionOperation};
+use crate::{
+    algo::view::ViewPlane,
+    plugins::{document::SelectionOperation, surface::RigSurface},
+    rig::proportion::{ProportionError, Quantity},
+};
 
 /// The operation of a gesture on the selected joints; `None` for all other gestures.
 pub(super) fn on_selection(gesture: &Gesture, plane: &ViewPlane) -> Option<SelectionOperation> {
@@ -21,6 +25,26 @@ pub(super) fn on_selection(gesture: &Gesture, plane: &ViewPlane) -> Option<Selec
         Gesture::MirrorSelected => SelectionOperation::Mirror,
         _ => return None,
     })
+}
+
+/// Refuses a gesture that would put joints out of all proportion to the model, where the rig has one.
+pub(super) fn check_proportion(gesture: &Gesture, surface: Option<&RigSurface>) -> Result<(), ProportionError> {
+    let distances = |numbers: &[f32]| match extent(surface) {
+        Some(size) => numbers.iter().try_for_each(|number| Quantity::Distance { size }.check(*number)),
+        None => Ok(()),
+    };
+    match gesture {
+        Gesture::Move((x, y)) | Gesture::Insert((x, y)) => distances(&[*x, *y]),
+        Gesture::MoveTo((x, y, z)) => distances(&[*x, *y, *z]),
+        Gesture::Scale(factor) => Quantity::Factor.check(*factor),
+        _ => Ok(()),
+    }
+}
+
+/// Largest coordinate of the model; `None` without one.
+fn extent(surface: Option<&RigSurface>) -> Option<f32> {
+    let (low, high) = surface?.ready()?.bounds()?;
+    Some(low.abs().max(high.abs()).max_element()).filter(|extent| extent.is_normal())
 }
 
 /// True for a gesture that is an operation on the selected joints.

@@ -2,14 +2,17 @@
 
 use std::collections::VecDeque;
 
-use bevy::{ecs::system::SystemParam, prelude::*};
+use bevy::{
+    ecs::{message::MessageId, system::SystemParam},
+    prelude::*,
+};
 
 use super::{
     Gesture,
     answers::Answers,
     click_run::{self, RequestedChange, RunRig},
     error::GestureError,
-    operation::on_selection,
+    operation::{check_proportion, on_selection},
     selection_run::{self, RequestedSelections},
 };
 use crate::{
@@ -31,7 +34,6 @@ use crate::{
     rig::{
         Rig, Uid,
         operations::{MirrorPlane, Operation},
-        step::Commit,
     },
 };
 
@@ -51,37 +53,28 @@ pub struct GestureScript {
     #[reflect(ignore)]
     pub(super) state: UserState,
     pub(super) pending: bool,
-    /// Move through the history of the gesture whose answer is pending.
+    /// Answer to the last gesture that was carried out alone.
     #[reflect(ignore)]
-    history_move: Option<HistoryMove>,
+    pub(super) awaited: Option<AwaitedAnswer>,
     /// True if gestures that follow one another are carried out in one frame where they can be.
     pub(super) is_unwatched: bool,
     /// Changes of a run that are requested, and complete its answers.
     #[reflect(ignore)]
     pub(super) requested: VecDeque<RequestedChange>,
-    /// Number of refusals of changes of a run that are answered, and still to be read.
-    pub(super) refused_changes: usize,
     /// Selections that are requested.
     #[reflect(ignore)]
     pub(super) selections: RequestedSelections,
 }
 
-/// Move through the history.
-#[derive(Clone, Copy)]
-enum HistoryMove {
-    Undo,
-    Redo,
-}
-
-impl HistoryMove {
-    /// Move that a gesture is; `None` for any other gesture.
-    fn of(gesture: &Gesture) -> Option<Self> {
-        match gesture {
-            Gesture::Undo => Some(Self::Undo),
-            Gesture::Redo => Some(Self::Redo),
-            _ => None,
-        }
-    }
+/// Request of a gesture, whose answer is the gesture's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum AwaitedAnswer {
+    Edit(MessageId<EditRequest>),
+    Pick(MessageId<PickRequest>),
+    Place(MessageId<PlaceRequest>),
+    Stroke(MessageId<StrokeRequest>),
+    /// Fit of this mesh.
+    Fit(Entity),
 }
 
 /// Answer to a gesture.
@@ -191,15 +184,15 @@ impl GestureScript {
         self.waiting.is_empty() && !self.pending
     }
 
-    /// Returns `true` if an edit may answer the last gesture. An undo or a redo that waits for a step that is computed is
-    /// answered by no other step, and the changes of a run have answers of their own.
-    pub(super) fn is_answered_by(&self, committed: Option<&Commit>) -> bool {
-        match self.history_move {
-            _ if !self.requested.is_empty() => false,
-            Some(HistoryMove::Undo) => matches!(committed, Some(Commit::Undone(_))),
-            Some(HistoryMove::Redo) => matches!(committed, Some(Commit::Redone(_))),
-            None => !matches!(committed, Some(Commit::Undone(_) | Commit::Redone(_))),
-        }
+    /// Returns `true` if the last gesture waits for this answer.
+    pub(super) fn awaits(&self, answer: AwaitedAnswer) -> bool {
+        self.pending && self.awaited == Some(answer)
+    }
+
+    /// Lets the next gesture begin. A refusal of this `edit` may still come.
+    pub(super) fn finish(&mut self, edit: Option<MessageId<EditRequest>>) {
+        self.pending = false;
+        self.awaited = edit.map(AwaitedAnswer::Edit);
     }
 
     /// Lets go of the gestures that are not begun, and returns the first of them.
@@ -296,22 +289,26 @@ pub(super) fn run_scripts(
             selection_run::carry_out(&mut script, (entity, rig, bounds), &mut requests.picks, &limits);
             continue;
         }
-        let Some(gesture) = script.begin_next(rig.len(), &limits) else { continue };
-        script.history_move = HistoryMove::of(&gesture);
+        let Some(gesture) = script.begin_next(rig.len(), surface, &limits) else { continue };
         let mesh = meshes.and_then(|meshes| meshes.iter().next());
         let (state, symmetry) = (&mut script.state, &mut symmetry);
         let mut act = GestureRun { entity, mesh, rig, selection, bounds, state, symmetry };
         match act.make(gesture, &mut requests) {
-            Ok(pending) => script.pending = pending,
+            Ok(awaited) => (script.pending, script.awaited) = (awaited.is_some(), awaited),
             Err(error) => script.fail(&error),
         }
     }
 }
 
 impl GestureScript {
-    /// Takes the next gesture of the script of a rig with so many joints, and begins its answer; `None` where the list or
-    /// the gesture is too long.
-    pub(super) fn begin_next(&mut self, joints: usize, limits: &RigLimits) -> Option<Gesture> {
+    /// Takes the next gesture of the script of a rig with so many joints and this surface, and begins its answer; `None` where
+    /// the list or the gesture is too long, or its numbers are out of all proportion.
+    pub(super) fn begin_next(
+        &mut self,
+        joints: usize,
+        surface: Option<&RigSurface>,
+        limits: &RigLimits,
+    ) -> Option<Gesture> {
         self.state.joints_before = joints;
         let gesture = self.waiting.pop_front()?;
         let number = self.answers.len() + 1;
@@ -323,6 +320,10 @@ impl GestureScript {
             return None;
         }
         if let Err(error) = limits.check_gesture(LIST, number, &gesture) {
+            self.fail(&error.into());
+            return None;
+        }
+        if let Err(error) = check_proportion(&gesture, surface) {
             self.fail(&error.into());
             return None;
         }
@@ -360,10 +361,10 @@ impl GestureRun<'_, '_> {
         self.active().map(|_| self.selection.0.clone())
     }
 
-    /// Sends the requests of a gesture; returns `true` if it has to wait for an answer.
-    fn make(&mut self, gesture: Gesture, requests: &mut Requests) -> Result<bool, GestureError> {
+    /// Sends the requests of a gesture; gives the answer that it has to wait for.
+    fn make(&mut self, gesture: Gesture, requests: &mut Requests) -> Result<Option<AwaitedAnswer>, GestureError> {
         if self.state.take_setting(&gesture) {
-            return Ok(false);
+            return Ok(None);
         }
         let rig = self.entity;
         let mut operation = None;
@@ -375,12 +376,12 @@ impl GestureRun<'_, '_> {
             }
             Gesture::Click(at) => {
                 let ray = self.plane().ray(at.into());
-                requests.places.write(PlaceRequest { rig, ray, settings: self.state.place });
-                return Ok(true);
+                let request = requests.places.write(PlaceRequest { rig, ray, settings: self.state.place });
+                return Ok(Some(AwaitedAnswer::Place(request)));
             }
             Gesture::Stroke { points, threshold, joints } => {
-                requests.strokes.write(self.state.stroke(rig, self.bounds, &points, threshold, joints));
-                return Ok(true);
+                let stroke = self.state.stroke(rig, self.bounds, &points, threshold, joints);
+                return Ok(Some(AwaitedAnswer::Stroke(requests.strokes.write(stroke))));
             }
             Gesture::Select(at) => pick = Some((self.click(at), false)),
             Gesture::Add(at) => pick = Some((self.click(at), true)),
@@ -405,27 +406,27 @@ impl GestureRun<'_, '_> {
                     template => template.map_or(FitTemplate::Choose, FitTemplate::Named),
                 };
                 requests.fits.write(FitRequest { template, ..FitRequest::new(mesh) });
-                return Ok(true);
+                return Ok(Some(AwaitedAnswer::Fit(mesh)));
             }
             Gesture::Undo => {
-                requests.edits.write(EditRequest { rig, change: Change::Undo });
-                return Ok(true);
+                let request = requests.edits.write(EditRequest { rig, change: Change::Undo });
+                return Ok(Some(AwaitedAnswer::Edit(request)));
             }
             Gesture::Redo => {
-                requests.edits.write(EditRequest { rig, change: Change::Redo });
-                return Ok(true);
+                let request = requests.edits.write(EditRequest { rig, change: Change::Redo });
+                return Ok(Some(AwaitedAnswer::Edit(request)));
             }
             other => operation = Some(self.operation(other)?),
         }
         if let Some((what, add)) = pick {
-            requests.picks.write(PickRequest { rig, what, add });
-            return Ok(true);
+            let request = requests.picks.write(PickRequest { rig, what, add });
+            return Ok(Some(AwaitedAnswer::Pick(request)));
         }
         if let Some(operation) = operation {
-            requests.edits.write(EditRequest::operation(rig, operation));
-            return Ok(true);
+            let request = requests.edits.write(EditRequest::operation(rig, operation));
+            return Ok(Some(AwaitedAnswer::Edit(request)));
         }
-        Ok(false)
+        Ok(None)
     }
 
     fn click(&self, at: (f32, f32)) -> Pick {

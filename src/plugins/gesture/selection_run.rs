@@ -4,7 +4,7 @@
 
 use std::collections::VecDeque;
 
-use bevy::prelude::*;
+use bevy::{ecs::message::MessageId, prelude::*};
 
 use super::{Gesture, GestureScript, error::GestureError};
 use crate::{
@@ -22,26 +22,28 @@ const LEAST: usize = 64;
 /// Requested selections whose answers are to come, in their order.
 #[derive(Default)]
 pub(super) struct RequestedSelections {
-    /// Index of the answer that each completes; `None` for a selection that is cleared, which tells nothing.
-    answers: VecDeque<Option<usize>>,
+    /// Requests, each with the index of the answer that it completes; `None` for a selection that is cleared, which tells nothing.
+    answers: VecDeque<(MessageId<PickRequest>, Option<usize>)>,
     /// Number of those that complete an answer.
     open: usize,
 }
 
 impl RequestedSelections {
-    fn push(&mut self, answer: Option<usize>) {
+    fn push(&mut self, request: MessageId<PickRequest>, answer: Option<usize>) {
         self.open += usize::from(answer.is_some());
-        self.answers.push_back(answer);
+        self.answers.push_back((request, answer));
     }
 
     /// Index of the first answer that is to be completed.
     pub(super) fn first_open(&self) -> Option<usize> {
-        self.answers.iter().flatten().next().copied()
+        self.answers.iter().find_map(|(_, answer)| *answer)
     }
 
-    /// The answer that the next selection completes; the outer `None` where none is requested.
-    fn pop(&mut self) -> Option<Option<usize>> {
-        let answer = self.answers.pop_front()?;
+    /// The answer that a selection completes; the outer `None` for one that was not requested here.
+    fn take(&mut self, request: MessageId<PickRequest>) -> Option<Option<usize>> {
+        // Requests are answered in their order.
+        let at = self.answers.iter().position(|(asked, _)| *asked == request)?;
+        let (_, answer) = self.answers.remove(at)?;
         self.open -= usize::from(answer.is_some());
         Some(answer)
     }
@@ -71,7 +73,7 @@ pub(super) fn carry_out(
         if !goes_on {
             break;
         }
-        let Some(gesture) = script.begin_next(rig.len(), limits) else { continue };
+        let Some(gesture) = script.begin_next(rig.len(), None, limits) else { continue };
         if script.state.take_setting(&gesture) {
             continue;
         }
@@ -92,16 +94,17 @@ pub(super) fn carry_out(
             _ => Pick::None,
         };
         let is_told = !matches!(what, Pick::None);
-        script.selections.push(is_told.then(|| script.answers.len() - 1));
-        picks.write(PickRequest { rig: entity, what, add: is_added });
+        let request = picks.write(PickRequest { rig: entity, what, add: is_added });
+        let answer = is_told.then(|| script.answers.len() - 1);
+        script.selections.push(request, answer);
     }
     script.pending = script.selections.open > 0;
 }
 
 impl GestureScript {
-    /// Takes over the answer to a requested selection; false if none is requested.
-    pub(super) fn take_selection(&mut self, joints: &[Uid], rig: &Rig) -> bool {
-        let Some(number) = self.selections.pop() else { return false };
+    /// Takes over the answer to a requested selection; false if this one was not requested here.
+    pub(super) fn take_selection(&mut self, request: MessageId<PickRequest>, joints: &[Uid], rig: &Rig) -> bool {
+        let Some(number) = self.selections.take(request) else { return false };
         if let Some(number) = number {
             self.pending = self.selections.open > 0;
             if let Some(answer) = self.answers.get_mut(number) {

@@ -42,7 +42,7 @@ pub(super) fn tell_driven(
                 driver: driver(built, document, node.uid, &attribute.name),
             };
             warn!("{reason}");
-            refused.write(EditRefusal { rig, reason: reason.into() });
+            refused.write(EditRefusal { rig, request: None, reason: reason.into() });
         }
     }
 }
@@ -82,7 +82,7 @@ pub(super) fn tell_unknown(
                 let nearest = did_you_mean(&attribute, &known);
                 let reason = EntityWriteError::UnknownAttribute { node: name.clone(), attribute, nearest };
                 warn!("{reason}");
-                refused.write(EditRefusal { rig, reason: reason.into() });
+                refused.write(EditRefusal { rig, request: None, reason: reason.into() });
             }
         }
     }

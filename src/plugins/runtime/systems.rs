@@ -381,7 +381,7 @@ type MovedNode =
 
 /// True if two world transforms of a node differ only by rounding: by less than a share of the rig's height or, far from
 /// the origin, by the last digits of its coordinates.
-fn is_same_place(now: &Affine3A, wanted: &Affine3A, height: f32) -> bool {
+pub(crate) fn is_same_place(now: &Affine3A, wanted: &Affine3A, height: f32) -> bool {
     let rounding = 2.0 * f32::EPSILON * wanted.translation.abs().max_element();
     let is_near = |a: Vec3A, b: Vec3A| (a - b).length_squared() <= 1.6e-11 * b.length_squared();
     (now.translation - wanted.translation).abs().max_element() <= rounding.max(4e-6 * height)

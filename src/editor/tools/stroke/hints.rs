@@ -103,7 +103,7 @@ pub(super) fn answer(
     *leaving = left.read().last().map(|left| left.0).or(*leaving);
     let changed: Vec<Entity> = edited.read().filter(|report| report.is_new_step()).map(|report| report.rig).collect();
     let Some(active) = active else { return done.clear() };
-    for StrokeDone { rig, result } in done.read() {
+    for StrokeDone { rig, result, .. } in done.read() {
         if *rig != active.0 {
             continue;
         }

@@ -180,6 +180,32 @@ fn expressions_of_one_frame_do_not_mix() {
     assert_eq!(bench.rig().pose(), other.rig().pose());
 }
 
+/// Without a background, an expression that follows a step of its frame comes in the next frame, in its order, however busy the
+/// machine is.
+#[test]
+fn expressions_of_one_frame_come_one_a_frame() {
+    let ((mut bench, mesh), (mut other, _)) = (workbench(), workbench());
+    let (held, threads) = busy_threads();
+    let names = ["happiness", "sadness", "anger"];
+    for name in names {
+        let request = ExpressRequest { mesh, strengths: strength(name, 1.0), preview: false };
+        bench.app_mut().world_mut().write_message(request);
+    }
+    let rig = bench.rig_entity();
+    let steps = |app: &App| app.world().get::<RigHistory>(rig).unwrap().steps().0.len();
+    let app = bench.app_mut();
+    let before = steps(app);
+    for (number, name) in (1..).zip(names) {
+        app.update();
+        assert_eq!((steps(app), shown(app.world(), mesh)), (before + number, strength(name, 1.0)), "{name}");
+    }
+    assert!(!is_posing(app.world(), mesh));
+    drop(held);
+    drop(threads);
+    other.express(strength("anger", 1.0)).unwrap();
+    assert_eq!(bench.rig().pose(), other.rig().pose());
+}
+
 /// Code that asks for another expression in each frame gets some of them, and the last one, however long one takes.
 #[test]
 fn requests_that_wait_are_bounded_and_end_with_the_last() {
