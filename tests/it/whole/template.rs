@@ -73,7 +73,8 @@ pub fn written_again(rig: &Rig, is_alone: bool) {
     if is_alone {
         assert_eq!(&again.rig, rig, "{text}");
     }
-    assert_eq!(again.rig.rest_globals(), rig.rest_globals());
+    // Scales near the limit of numbers leave it in products: as words, since what is no number equals nothing.
+    assert_eq!(format!("{:?}", again.rig.rest_globals()), format!("{:?}", rig.rest_globals()));
     assert_eq!(write_template(&again.rig), text);
 }
 
