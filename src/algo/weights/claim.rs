@@ -14,11 +14,9 @@ const HEAT: f32 = 12.0;
 const BAND: f32 = 0.1;
 /// A patch that its joint sees less of than this is not its own.
 const SEEN: f32 = 0.25;
-/// Share by which the reach that a bone needs grows where the skin lies along the way to the bone rather than across it: such
-/// skin is likelier another bone's, from which it faces away.
-const ASIDE: f32 = 0.1;
-/// Share by which it grows besides at the strongest folds, when the two bones of a fold are compared; and twice as much where
-/// the skin faces towards the bone, as the palm of a fist faces the fingers.
+/// Share by which the reach that a bone needs grows where the skin lies along the way to the bone rather than across it, when the
+/// two bones of a strong fold are compared; and twice as much where the skin faces towards the bone, as the palm of a fist faces
+/// the fingers.
 const FOLD: f32 = 1.25;
 /// Points handled at a time by one thread.
 const CHUNK: usize = 256;
@@ -143,16 +141,10 @@ impl Skin {
         (reach(way.length(), bones.girths[bone as usize]), self.normal.dot(way.normalize_or_zero()))
     }
 
-    /// The reach that a bone needs with regard to the slope of the skin, whichever side of it the bone is on.
-    fn sloped_reach(self, bones: &Bones, bone: u32) -> f32 {
-        let (reach, cosine) = self.reach(bones, bone);
-        reach * (1.0 + ASIDE * (self.normal.length() - cosine.abs()).max(0.0))
-    }
-
     /// The reach by which the bones of a fold of a given strength are compared.
     fn folded_reach(self, bones: &Bones, bone: u32, strength: f32) -> f32 {
         let (reach, cosine) = self.reach(bones, bone);
-        reach * (1.0 + (ASIDE + FOLD * strength) * (self.normal.length() - cosine).max(0.0))
+        reach * (1.0 + FOLD * strength * (self.normal.length() - cosine).max(0.0))
     }
 
     /// Shares the claims of folded bones, cheapest first, with the bones beyond the fold: the better one of the two takes the
@@ -193,7 +185,7 @@ fn claim(index: usize, skin: Skin, bones: &Bones, sight: &Sight, near: &mut Vec<
     let mut result = Claim::default();
     let (point, island) = (skin.point, sight.island(index));
     let may_hold = |bone: u32| bones.may_hold(bone, island);
-    let cost = |bone: u32| if may_hold(bone) { skin.sloped_reach(bones, bone) } else { f32::INFINITY };
+    let cost = |bone: u32| if may_hold(bone) { skin.reach(bones, bone).0 } else { f32::INFINITY };
     bones.tree.nearest(point, BAND, cost, near);
     skin.share_folds(bones, may_hold, near);
     let Some(&(best, first)) = near.first() else { return result };

@@ -259,6 +259,10 @@ impl LiveRig {
             let (Some(at), Some(wanted)) = (self.get::<GlobalTransform>(entity), state.global(node.uid)) else {
                 continue;
             };
+            if !wanted.translation.is_finite() {
+                assert!(!at.translation().is_finite(), "{} is at {at:?}, and nowhere by the program", node.name);
+                continue;
+            }
             // Squares of far places are beyond single precision.
             let off = at.translation().as_dvec3().distance(wanted.translation.as_dvec3()) / f64::from(far);
             // Numbers that no float holds are compared with none.
