@@ -6,6 +6,7 @@
 mod birds;
 mod decimate;
 mod limbs;
+mod quadrupeds;
 pub mod shapes;
 mod soles;
 mod true_joints;
@@ -91,7 +92,7 @@ fn joints_are_where_they_should_be() {
         ("gltf_skinned/RobotExpressive.glb", 3.25),
         ("characters/Mage.glb", 3.3),
         ("creatures/fox-fox.glb", 3.8),
-        ("creatures/fox-dog.glb", 4.25),
+        ("creatures/fox-dog.glb", 4.2),
         ("creatures/bird-eagle.glb", 3.85),
     ]
     .into();
@@ -117,7 +118,7 @@ fn a_creature_held_back_is_fitted() {
     assert_eq!(off.len(), 20, "{off:?}");
     let body = mean(off.iter().map(|(.., off)| *off));
     println!("{}: {body:.2}", held.figure.name);
-    assert!(body <= 7.45, "{body}: {off:?}");
+    assert!(body <= 7.3, "{body}: {off:?}");
 }
 
 /// Of joints that are wrong by more than 5, most are doubtful; of doubtful ones, half are wrong.

@@ -12,7 +12,7 @@ use glam::{Quat, Vec3};
 use super::{
     align::{self, Similarity},
     chain, level,
-    limbs::{LimbKind, TemplateLimbs},
+    limbs::{Limb, LimbKind, TemplateLimbs},
     tree::Tree,
     volume::VoxelGraph,
 };
@@ -29,6 +29,8 @@ const TRIED_FREE: usize = 2_000;
 pub(super) const KEPT: usize = 6;
 /// Largest deviation (of a logarithm) of a way from the template's that counts.
 const MOST_SPREAD: f32 = 0.6;
+/// Share of a deviation that counts for the tail of an animal on all fours, which is as long as it likes.
+const TAIL: f32 = 0.2;
 /// Penalty of a limb that has no branch.
 const MISSING: f32 = 0.25;
 /// Penalties of a missing head, which hardly any figure lacks, and of a missing tail.
@@ -241,6 +243,7 @@ impl Search<'_> {
     fn cost(&self, chosen: &Assignment) -> f32 {
         let limbs = &self.template.limbs;
         let mut logs = Vec::new();
+        let mut of_tails = Vec::new();
         for a in 0..limbs.len() {
             for b in a + 1..limbs.len() {
                 if let (Some(la), Some(lb)) = (chosen[a], chosen[b])
@@ -248,6 +251,8 @@ impl Search<'_> {
                     && !limbs[b].stem
                 {
                     let (mesh, template) = (self.ways[la][lb], self.template.way(a, b));
+                    let is_of_tail = self.has_free_length(&limbs[a]) || self.has_free_length(&limbs[b]);
+                    let logs = if is_of_tail { &mut of_tails } else { &mut logs };
                     logs.push(bevy::math::ops::ln(mesh.max(1e-4) / template.max(1e-4)));
                 }
             }
@@ -255,9 +260,11 @@ impl Search<'_> {
         // Deviations from the median, cut off, so that one short pair of legs does not rule an assignment out.
         logs.sort_by(f32::total_cmp);
         let median = logs.get(logs.len() / 2).copied().unwrap_or(0.0);
-        let spread: f32 = logs.iter().map(|l| (l - median).abs().min(MOST_SPREAD)).sum();
+        let spread_of = |logs: &[f32]| logs.iter().map(|l| (l - median).abs().min(MOST_SPREAD)).sum::<f32>();
+        let spread = spread_of(&logs) + TAIL * spread_of(&of_tails);
+        let count = (logs.len() + of_tails.len()).max(1);
         let free = limbs.iter().all(|l| l.kind == LimbKind::Free);
-        let mut cost = if free { 0.2 } else { 1.0 } * spread / logs.len().max(1) as f32;
+        let mut cost = if free { 0.2 } else { 1.0 } * spread / count as f32;
         for (a, limb) in limbs.iter().enumerate() {
             let Some(leaf) = chosen[a] else {
                 cost += match limb.kind {
@@ -289,6 +296,11 @@ impl Search<'_> {
         }
         cost += BEYOND * self.beyond_trunk(chosen);
         cost + self.unlike_shapes(chosen)
+    }
+
+    /// True for the tail of an animal on all fours, whose length tells little.
+    fn has_free_length(&self, limb: &Limb) -> bool {
+        limb.kind == LimbKind::Tail && self.template.is_on_fours()
     }
 
     /// Length over which arms and legs run together on their way to the centre of the branches, without the head, as a share of the
@@ -392,6 +404,8 @@ impl Search<'_> {
             let end = limb.joints[limb.joints.len() - 1];
             let way = template.length(limb.attach, end) + limb.beyond;
             let free = if self.tree.has_forks { line.among(&self.tree.branches, &leaves).free } else { line.free };
+            // What leaves the trunk of a tail is compared.
+            let end_of_way = if self.has_free_length(limb) { (free - way * scale).max(0.0) } else { 0.0 };
             let free = free.min(way * scale);
             for (number, &joint) in limb.joints.iter().enumerate() {
                 let along = (template.length(joint, end) + limb.beyond) * scale;
@@ -399,10 +413,10 @@ impl Search<'_> {
                 if along <= free * 1.05 || last {
                     let weight = template.length(limb.attach, joint).max(0.02 * template.size);
                     let weight = if limb.stem { 0.1 * weight } else { weight };
-                    pairs.push((template.positions[joint], line.at(along), weight));
+                    pairs.push((template.positions[joint], line.at(end_of_way + along), weight));
                 }
             }
-            pairs.push((template.tip(limb), line.at(0.0), way * if limb.stem { 0.05 } else { 0.5 }));
+            pairs.push((template.tip(limb), line.at(end_of_way), way * if limb.stem { 0.05 } else { 0.5 }));
         }
         let centre = self.graph.centres[self.tree.branches.centre as usize];
         let trunk = &template.trunk;

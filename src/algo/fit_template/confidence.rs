@@ -28,11 +28,13 @@ const HALF_STRAIN: f32 = 0.6;
 const ROOTED: f32 = 0.63;
 const FREE: f32 = 0.2;
 /// Confidence in the head of an animal, whose length varies most, as a share of that in its legs.
-const STEM: f32 = 0.87;
+const STEM: f32 = 0.75;
 /// Confidence in the joints that a figure's limbs show by themselves, in a figure without doubt.
 const SHOWN: f32 = 0.76;
 /// Confidence in the spine of an animal between the ends of its trunk, in a figure without doubt.
 const BETWEEN: f32 = 0.9;
+/// Most confidence in knees and elbows of animals on all fours: they lie in the flesh, and centre lines of legs bend elsewhere.
+const HIDDEN_HINGE: f32 = 0.45;
 
 fn trust(value: f32, half: f32) -> f32 {
     let q = value / half;
@@ -66,6 +68,9 @@ pub(super) fn joints(
         template.is_on_fours()
             && (heads.contains(&joint) || template.trunk.contains(&joint) && !ends.contains(&Some(&joint)))
     };
+    let hips: Vec<usize> =
+        template.limbs.iter().filter(|limb| template.is_hind_leg(limb)).map(|limb| limb.joints[0]).collect();
+    let hidden: Vec<usize> = template.limbs.iter().filter_map(|limb| template.hidden_hinge(limb)).collect();
     let evidence = Evidence::of(template, placement, best, places);
     (0..places.len())
         .map(|joint| {
@@ -90,12 +95,14 @@ pub(super) fn joints(
                             let own = if heads.contains(&joint) { STEM } else { 1.0 };
                             own * (0.76 + 0.19 * free) * bevy::math::ops::powf(doubt, 1.0 - 0.5 * free)
                         }
+                        FitReason::Proportion if hips.contains(&joint) => BETWEEN * doubt,
                         _ if is_between(joint) => BETWEEN * doubt,
                         _ => 0.52 * doubt,
                     };
                     let is_shown = evidence.is_shown[joint];
                     let by_itself = if is_shown { trust(best.posed_cost(), HALF_COST).sqrt() } else { 0.0 };
-                    (confidence.max(SHOWN * by_itself) * evidence.carried[joint], reason)
+                    let most = if hidden.contains(&joint) { HIDDEN_HINGE } else { 1.0 };
+                    ((confidence.max(SHOWN * by_itself) * evidence.carried[joint]).min(most), reason)
                 }
             };
             if confidence < 0.5 && reason == FitReason::Surface {

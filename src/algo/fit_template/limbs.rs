@@ -125,6 +125,17 @@ impl TemplateLimbs {
         !self.is_upright() && self.count(LimbKind::Leg) >= 4
     }
 
+    /// True for a hind leg of an animal on all fours.
+    pub(super) fn is_hind_leg(&self, limb: &Limb) -> bool {
+        limb.kind == LimbKind::Leg && self.is_on_fours() && self.trunk.first() == Some(&limb.attach)
+    }
+
+    /// The knee or elbow of a leg of an animal on all fours, above its ankle, ball and toes.
+    pub(super) fn hidden_hinge(&self, limb: &Limb) -> Option<usize> {
+        let at = limb.joints.len().checked_sub(4).filter(|_| limb.kind == LimbKind::Leg && self.is_on_fours())?;
+        limb.joints.get(at).copied()
+    }
+
     /// True for a leg of an animal that walks on two with a hock below its knee, which the trunk hides.
     pub(super) fn has_hidden_knee(&self, limb: &Limb) -> bool {
         limb.kind == LimbKind::Leg && !self.is_upright() && !self.is_on_fours() && limb.joints.len() > 3

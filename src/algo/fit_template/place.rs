@@ -40,6 +40,11 @@ const LEADING_EDGE: f32 = 0.4;
 const SHOULDER_EDGE: f32 = 0.65;
 const SHOULDER: f32 = 0.15;
 
+/// Share of the way to where the centre line bends by which a joint moves, and that of the knee of an animal on all fours, over
+/// which the flesh of the thigh bends the line lower down.
+const TO_BEND: f32 = 0.8;
+const KNEE: f32 = 0.3;
+
 /// Rounds in which the joints of a limb of an animal on all fours move to its bends: a hock that moves up takes the knee
 /// along, and shows more of its own bend then.
 const ROUNDS: usize = 2;
@@ -268,7 +273,8 @@ impl Work<'_> {
                     best = (away, length);
                 }
             }
-            let moved = lengths[i] + 0.8 * (best.1 - lengths[i]);
+            let is_knee = i == 1 && self.template.is_hind_leg(limb);
+            let moved = lengths[i] + if is_knee { KNEE } else { TO_BEND } * (best.1 - lengths[i]);
             let rest = (whole - moved) / (whole - lengths[i]).max(1e-9);
             let below = lengths[i];
             if !self.template.is_upright() {
