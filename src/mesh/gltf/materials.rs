@@ -157,7 +157,9 @@ fn images(
                     Ok(bytes) => {
                         let file = path.rsplit('/').next().unwrap_or_default();
                         image.bytes = bytes;
-                        image.name = if image.name.is_empty() { file.to_owned() } else { image.name };
+                        if image.name.is_empty() && !is_given_name(file) {
+                            image.name = file.to_owned();
+                        }
                     }
                     Err(error) => {
                         notes.add(format!("The image \"{path}\" could not be loaded ({error}) and is left out"));
@@ -179,6 +181,16 @@ fn images(
         images.push(image);
     }
     Ok(images)
+}
+
+/// True if the name of a file ends in the hash of its content, as names do that are given to files beside a `.gltf`: an image
+/// there whose document names it has that name, and one without a name stays without.
+fn is_given_name(file: &str) -> bool {
+    const DIGITS: usize = 16;
+    let hash = file.rsplit('.').nth(1).and_then(|mark| mark.split('-').next());
+    hash.is_some_and(|hash| {
+        hash.len() == DIGITS && hash.bytes().all(|b| b.is_ascii_digit() || (b'a'..=b'f').contains(&b))
+    })
 }
 
 fn too_large(place: String) -> GltfError {
