@@ -100,6 +100,32 @@ impl BoneTree {
     }
 }
 
+impl BoneTree {
+    /// Calls `meet` for each bone of the nodes whose boxes are at most `radius` away from a point, until it returns `true`.
+    /// Returns whether it did.
+    pub fn any_within(&self, point: Vec3, radius: f32, mut meet: impl FnMut(u32) -> bool) -> bool {
+        let mut stack = [0u32; 64];
+        let mut waiting = usize::from(!self.nodes.is_empty());
+        while waiting > 0 {
+            waiting -= 1;
+            let index = stack[waiting];
+            let node = &self.nodes[index as usize];
+            if distance_to_box(point, node) > radius {
+                continue;
+            }
+            if node.count == 0 {
+                stack[waiting] = node.first;
+                stack[waiting + 1] = index + 1;
+                waiting += 2;
+            } else if self.order[node.first as usize..(node.first + node.count) as usize].iter().any(|&bone| meet(bone))
+            {
+                return true;
+            }
+        }
+        false
+    }
+}
+
 fn distance_to_box(point: Vec3, node: &Node) -> f32 {
     // A hair less, so that rounding never hides a bone that lies on its box.
     point.distance(point.clamp(node.low, node.high)) * 0.999_99
