@@ -217,7 +217,7 @@ impl Homes {
         let with_bones: Vec<usize> = (0..parts.len()).filter(|&part| parts[part].is_some()).collect();
         let boxes = with_bones.iter().filter_map(|&part| sight.corners(part));
         let boxes: Vec<BoneSegment> = boxes.map(|[head, tail]| BoneSegment { joint: 0, head, tail }).collect();
-        let tree = BoneTree::new(&boxes);
+        let tree = BoneTree::of_boxes(&boxes);
         let mut bearers: Vec<usize> = (0..parts.len()).collect();
         let mut lying = vec![false; parts.len()];
         for part in sight.parts().filter(|&part| parts[part].is_none() && !with_bones.is_empty()) {

@@ -23,7 +23,11 @@ const SLACK: f32 = 1e-5;
 /// Places that are looked for in large islands: so many in any mesh, and some more for each island and joint. Of characters
 /// with dozens of parts and hundreds of joints some thousand are.
 const MOST_LOOKS: u64 = 1 << 16;
-const LOOKS_OF_EACH: u64 = 64;
+const LOOKS_OF_EACH: u64 = 16;
+/// Crossings of the whole surface from which on it is a soup, unless there are few for each place that was looked for: so many in
+/// any mesh, and some more for each place. From a joint in a body a ray crosses the surface once to three times.
+const MOST_CROSSINGS: u64 = 1 << 22;
+const CROSSINGS_OF_EACH: u64 = 16 * DIRECTIONS as u64;
 
 /// Large island of a surface of several.
 struct Part {
@@ -75,6 +79,9 @@ pub(crate) struct Sight {
     /// Number of places that were compared with islands, and of those that were looked for in one.
     comparisons: AtomicU64,
     looks: AtomicU64,
+    /// Places that were looked for in the whole surface, and crossings that were found for them.
+    places: AtomicU64,
+    crossings: AtomicU64,
 }
 
 impl Sight {
@@ -95,9 +102,9 @@ impl Sight {
         let parts: Vec<u32> = (0..islands.len() as u32).filter(|&island| islands[island as usize].is_some()).collect();
         let diagonal = |&Part { corners: [head, tail], .. }: &Part| BoneSegment { joint: 0, head, tail };
         let diagonals: Vec<BoneSegment> = islands.iter().flatten().map(diagonal).collect();
-        let boxes = BoneTree::new(&diagonals);
-        let [comparisons, looks] = [0, 0].map(AtomicU64::new);
-        Self { whole, islands, parts, boxes, of: islands_of, comparisons, looks }
+        let boxes = BoneTree::of_boxes(&diagonals);
+        let [comparisons, looks, places, crossings] = [0; 4].map(AtomicU64::new);
+        Self { whole, islands, parts, boxes, of: islands_of, comparisons, looks, places, crossings }
     }
 
     /// True if nothing of its own island lies strictly between a point of the surface and a place: a collar hides no
@@ -132,9 +139,15 @@ impl Sight {
         self.whole.closest(&Ray { origin, direction }).map(|hit| hit.distance)
     }
 
-    /// True if the surface is around `point`.
+    /// True if the surface is around `point`. A soup is around nothing.
     pub fn encloses(&self, point: Vec3) -> bool {
-        encloses(&self.whole, point)
+        if self.crossings.load(Relaxed) > MOST_CROSSINGS + CROSSINGS_OF_EACH * self.places.load(Relaxed) {
+            return false;
+        }
+        let (is_around, crossings) = enclosure(&self.whole, point);
+        self.places.fetch_add(1, Relaxed);
+        self.crossings.fetch_add(crossings, Relaxed);
+        is_around
     }
 
     /// True if the pieces of a surface of several are around `point` in most directions, though none encloses it: hips between
@@ -177,11 +190,15 @@ impl Sight {
     /// True if more places were looked for in islands than a surface with so many joints has sense in: shells in shells, without
     /// end.
     pub fn is_crowded(&self, joints: usize) -> bool {
-        self.work() > DIRECTIONS as u64 * (MOST_LOOKS + LOOKS_OF_EACH * (self.parts.len() + joints) as u64)
+        self.searches() > DIRECTIONS as u64 * (MOST_LOOKS + LOOKS_OF_EACH * (self.parts.len() + joints) as u64)
     }
 
-    /// Work so far: places that were compared with islands, and rays for those that were looked for.
+    /// Work so far: crossings, places that were compared with islands, and rays for those that were looked for.
     pub fn work(&self) -> u64 {
+        self.crossings.load(Relaxed) + self.searches()
+    }
+
+    fn searches(&self) -> u64 {
         self.comparisons.load(Relaxed) + DIRECTIONS as u64 * self.looks.load(Relaxed)
     }
 
@@ -237,16 +254,22 @@ impl Sight {
 /// inside each other strengthen, but which needs triangles of one orientation. The share of rays with an odd number of
 /// crossings does not.
 fn encloses(surface: &Surface, point: Vec3) -> bool {
-    let (mut winding, mut odd) = (0i32, 0usize);
+    enclosure(surface, point).0
+}
+
+/// Whether a surface is around `point`, and the number of crossings that tell it.
+fn enclosure(surface: &Surface, point: Vec3) -> (bool, u64) {
+    let (mut winding, mut odd, mut crossings) = (0i32, 0usize, 0);
     let mut hits = Vec::new();
     for direction in evenly_spread() {
         if !surface.hits_within(&Ray { origin: point, direction }, MOST_LEAVES, &mut hits) {
-            return false;
+            return (false, crossings + MOST_LEAVES as u64);
         }
+        crossings += hits.len() as u64;
         winding += hits.iter().map(|hit| if hit.entering { -1 } else { 1 }).sum::<i32>();
         odd += hits.len() % 2;
     }
-    winding.unsigned_abs() as usize * 3 > DIRECTIONS || odd * 8 > DIRECTIONS * 5
+    (winding.unsigned_abs() as usize * 3 > DIRECTIONS || odd * 8 > DIRECTIONS * 5, crossings)
 }
 
 /// True if a surface is around `place` in nearly all directions, as around teeth; a mouth may stand open.
