@@ -34,6 +34,7 @@ mod islands;
 mod keypoints;
 pub(crate) mod laplacian;
 pub(crate) mod ldl;
+mod limb_parts;
 mod odds;
 mod report;
 mod rings;
@@ -290,6 +291,7 @@ pub fn skin_weights(
         };
         *count += 1;
     }
+    report.comparisons = gaps.comparisons();
     report.stiff_pieces = stiff.pieces(&place, &shaping, &limbs);
     report.stiff = report.stiff_pieces.iter().map(|piece| piece.points).sum();
     let middles = stiff.middles(points, &place);

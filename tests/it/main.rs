@@ -152,6 +152,7 @@ mod growth_bends;
 mod growth_clips;
 mod growth_fit;
 mod growth_picks;
+mod growth_weights;
 mod heads;
 #[cfg(feature = "cli")]
 mod hostile;

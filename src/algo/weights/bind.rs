@@ -111,6 +111,11 @@ impl Gaps {
         let gap = self.sight.gap(head).filter(|_| !self.sight.encloses(head))?;
         Some(gap / self.scale)
     }
+
+    /// Work to find which pieces belong to which bones.
+    pub fn comparisons(&self) -> u64 {
+        self.sight.work()
+    }
 }
 
 /// Input of a binding that a mesh and its coarse stand-in share.

@@ -28,36 +28,50 @@ struct Node {
 impl BoneTree {
     /// Builds the tree by median splits. O(n log n) for n bones.
     pub fn new(bones: &[BoneSegment]) -> Self {
+        Self::build(bones, false)
+    }
+
+    /// The same over boxes, of which each "bone" is a diagonal. Flat boxes over each other are split across, however they lie.
+    pub fn of_boxes(diagonals: &[BoneSegment]) -> Self {
+        Self::build(diagonals, true)
+    }
+
+    fn build(bones: &[BoneSegment], are_boxes: bool) -> Self {
         let mut tree = Self { nodes: Vec::new(), order: (0..bones.len() as u32).collect() };
         if !bones.is_empty() {
-            tree.split(bones, 0, bones.len());
+            tree.split(bones, 0, bones.len(), are_boxes);
         }
         tree
     }
 
-    fn split(&mut self, bones: &[BoneSegment], from: usize, to: usize) {
+    fn split(&mut self, bones: &[BoneSegment], from: usize, to: usize, are_boxes: bool) {
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        let (mut low_middle, mut high_middle) = (low, high);
+        let (mut low_middle, mut high_middle, mut extent) = (low, high, Vec3::ZERO);
         for &bone in &self.order[from..to] {
             let BoneSegment { head, tail, .. } = bones[bone as usize];
             low = low.min(head).min(tail);
             high = high.max(head).max(tail);
             low_middle = low_middle.min(head + tail);
             high_middle = high_middle.max(head + tail);
+            extent += (tail - head).abs();
         }
         let node = self.nodes.len();
         self.nodes.push(Node { low, high, first: from as u32, count: (to - from) as u32 });
         if to - from <= LEAF {
             return;
         }
-        let axis = (high_middle - low_middle).max_position();
+        let spread = high_middle - low_middle;
+        let axis = match are_boxes {
+            true => (spread / (extent / (to - from) as f32 + spread * 1e-3 + f32::MIN_POSITIVE)).max_position(),
+            false => spread.max_position(),
+        };
         let middle = (to - from) / 2;
         let place = |&b: &u32| bones[b as usize].head[axis] + bones[b as usize].tail[axis];
         self.order[from..to].select_nth_unstable_by(middle, |a, b| place(a).total_cmp(&place(b)).then(a.cmp(b)));
-        self.split(bones, from, from + middle);
+        self.split(bones, from, from + middle, are_boxes);
         self.nodes[node].first = self.nodes.len() as u32;
         self.nodes[node].count = 0;
-        self.split(bones, from + middle, to);
+        self.split(bones, from + middle, to, are_boxes);
     }
 
     /// The bones whose `cost` is at most `1 + band` times the least, cheapest first, as (cost, bone). `out` is
@@ -97,6 +111,32 @@ impl BoneTree {
         }
         out.retain(|e| e.0 <= best * (1.0 + band));
         out.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    }
+}
+
+impl BoneTree {
+    /// Calls `meet` for each bone of the nodes whose boxes are at most `radius` away from a point, until it returns `true`.
+    /// Returns whether it did.
+    pub fn any_within(&self, point: Vec3, radius: f32, mut meet: impl FnMut(u32) -> bool) -> bool {
+        let mut stack = [0u32; 64];
+        let mut waiting = usize::from(!self.nodes.is_empty());
+        while waiting > 0 {
+            waiting -= 1;
+            let index = stack[waiting];
+            let node = &self.nodes[index as usize];
+            if distance_to_box(point, node) > radius {
+                continue;
+            }
+            if node.count == 0 {
+                stack[waiting] = node.first;
+                stack[waiting + 1] = index + 1;
+                waiting += 2;
+            } else if self.order[node.first as usize..(node.first + node.count) as usize].iter().any(|&bone| meet(bone))
+            {
+                return true;
+            }
+        }
+        false
     }
 }
 

@@ -13,7 +13,7 @@ use super::{
     bone_tree::{BoneTree, closest_on},
     folds::{Fold, folds},
     keypoints,
-    roots::{Homes, Roots, parents_first},
+    roots::{Homes, MANY_CHILDREN, Roots, parents_first},
     sight::Sight,
 };
 
@@ -162,6 +162,9 @@ fn passes_beside(joints: &[WeightJoint], carries: &[bool], children: &[Vec<usize
         let onwards = joints[*child].head - to;
         onwards.length() < THICK * length && onwards.dot(way) < ASIDE * onwards.length() * length
     };
+    if children[parent].len() > MANY_CHILDREN {
+        return false;
+    }
     let mut limb = children[joint].iter().filter(|child| carries[**child]).peekable();
     if limb.peek().is_none() || !limb.all(goes_aside) {
         return false;

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use glam::Vec3;
 
 use super::{
-    Method, WeightJoint, bone::BoneSegment, claim::Claim, grips::Grips, laplacian::Graph, report::Stiffness, rings,
-    sight::is_surrounded,
+    Method, WeightJoint, bone::BoneSegment, claim::Claim, grips::Grips, laplacian::Graph, report::Stiffness,
+    rings::RingBones, sight::is_surrounded,
 };
 use crate::mesh::{adjacency, model::Weights, surface::Surface};
 
@@ -94,6 +94,7 @@ impl Islands {
         let is_carrier = |joint: u32| has_flesh && slots[joint as usize];
         let is_part = members.iter().filter(|members| members.len() > 2).count() > 1;
         let grips = Grips::new(joints, bones);
+        let ring_bones = RingBones::new(bones);
         let mut rows: Vec<Option<Vec<(u32, f32)>>> = (sums.iter().zip(&members).enumerate())
             .map(|(island, (sums, members))| {
                 if !is_part || members.len() < 3 || bends[island] {
@@ -107,7 +108,7 @@ impl Islands {
                     return alone(*first.0);
                 }
                 let carrier = || (!self.are_small(island)).then(|| grips.carrier(sums, members)).flatten();
-                if let Some(joint) = rings::bearer(members, bones).or_else(carrier) {
+                if let Some(joint) = ring_bones.bearer(members).or_else(carrier) {
                     return alone(joint);
                 }
                 match self.are_small(island) {

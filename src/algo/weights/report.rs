@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::{WeightJoint, finish::Shaping, twist::Limbs};
 use crate::mesh::model::Weights;
 
-/// Origins of the weights, stiff pieces of the mesh and idle joints; the counts but `stiff` add up to `points`.
+/// Origins of the weights, stiff pieces of the mesh and idle joints; the counts of points but `stiff` add up to `points`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct WeightReport {
     /// Points bound by heat on the surface.
@@ -28,6 +28,9 @@ pub struct WeightReport {
     pub stiff_pieces: Vec<StiffPiece>,
     /// Joints that hold no skin, in order.
     pub idle_joints: Vec<IdleJoint>,
+    /// Work to find which pieces of the mesh belong to which bones: bones and pieces that were compared, and rays. It grows with the
+    /// number of bones and pieces that are near to each other.
+    pub comparisons: u64,
 }
 
 /// Connected piece of the surface that moves as one.

@@ -1,23 +1,25 @@
 //! Joints without flesh, and the body part of each bone: roots, targets and slots hang in the air, and an arm holds no
 //! flesh of a head that is a part of its own.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use glam::Vec3;
 
 use super::{
     WeightJoint,
     bone::BoneSegment,
     bone_tree::{BoneTree, closest_on},
-    bones::LEAF_REACH,
-    rings,
+    limb_parts::separate_limbs,
+    rings::RingBones,
     sight::Sight,
 };
 
-/// Roots with more children than this keep all their bones.
-const MANY_CHILDREN: usize = 256;
+/// Roots with more children than this keep all their bones, and bones to so many run side by side.
+pub(super) const MANY_CHILDREN: usize = 256;
 /// Samples along a bone.
-const STATIONS: usize = 8;
+pub(super) const STATIONS: usize = 8;
 /// A body part is a bone's home if it encloses the bone's joint or at least this share of the bone.
-const AT_HOME: f32 = 0.7;
+pub(super) const AT_HOME: f32 = 0.7;
 
 /// The joints above the body, which carry a character through the world and hold no flesh.
 pub(crate) struct Roots {
@@ -71,21 +73,23 @@ impl Roots {
         let Some(body) = order.iter().copied().filter(is_hanging).max_by_key(|&index| sizes[index]) else {
             return vec![false; joints.len()];
         };
-        let parts: Vec<usize> = sight.parts().collect();
-        let homes = |index: usize| -> Vec<bool> {
+        let has_parts = sight.parts().next().is_some();
+        let homes = |index: usize| -> Vec<usize> {
             let head = joints[index].head;
-            if parts.is_empty() {
-                return vec![sight.encloses(head)];
+            if !has_parts {
+                return if sight.encloses(head) { vec![0] } else { Vec::new() };
             }
-            parts.iter().map(|&part| sight.is_within(part, head)).collect()
+            let mut homes = sight.candidates(head);
+            homes.retain(|&part| !sight.is_crowded(joints.len()) && sight.is_within(part, head));
+            homes
         };
-        let mut shared = vec![false; parts.len().max(1)];
+        let mut shared = vec![false; sight.islands().max(1)];
         for index in (0..joints.len()).filter(|&index| top[index] == body) {
-            shared.iter_mut().zip(homes(index)).for_each(|(shared, home)| *shared |= home);
+            homes(index).into_iter().for_each(|home| shared[home] = true);
         }
         let mut own = vec![false; joints.len()];
         for index in (0..joints.len()).filter(|&index| self.hangs_in_air[top[index]] && top[index] != body) {
-            own[top[index]] |= homes(index).iter().zip(&shared).any(|(home, shared)| *home && !shared);
+            own[top[index]] |= homes(index).into_iter().any(|home| !shared[home]);
         }
         for index in self.apart(joints, &top, body, sight) {
             own[top[index]] = true;
@@ -153,10 +157,14 @@ impl Roots {
 /// The body parts of a surface of several that each joint holds flesh of.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Homes {
-    /// Flags of each island: whether it is home to each joint; empty where everybody may hold it but slots.
-    parts: Vec<Vec<bool>>,
+    /// Joints that are at home in each island, rising; `None` where everybody may hold it but slots.
+    parts: Vec<Option<Vec<u32>>>,
+    /// The island whose joints hold each island: the one that it lies on if it has no bones, or itself.
+    bearers: Vec<usize>,
     /// Flag of each joint: whether it is a slot; empty if nothing else holds flesh.
     slots: Vec<bool>,
+    /// Flag of each island: whether joints without slots are at home there, so that slots hold nothing of it.
+    has_flesh: Vec<bool>,
     /// Bones that lead to limbs which are parts of their own, by the island that they hold nothing of; sorted.
     links: Vec<(usize, u32)>,
     /// Flag of each island: whether no bone runs through it while others have some.
@@ -177,63 +185,55 @@ impl Homes {
         points: &[Vec3],
         sight: &Sight,
     ) -> Self {
-        let mut parts = vec![Vec::new(); sight.islands()];
-        for part in sight.parts() {
-            let mut at_home = vec![false; claims.len()];
-            for segment in segments {
-                let is_home = &mut at_home[segment.joint as usize];
-                let is_within = |place| sight.is_within(part, place);
-                *is_home = *is_home
-                    || is_within(segment.head)
-                    || segment.head != segment.tail && share(segment.head, segment.tail, is_within) >= AT_HOME;
-            }
-            parts[part] = if at_home.contains(&true) { at_home } else { Vec::new() };
+        let is_slot = |joint: u32| slots[joint as usize];
+        let slots_beside_flesh =
+            if segments.iter().all(|segment| is_slot(segment.joint)) { Vec::new() } else { slots.to_vec() };
+        let residents = residents(segments, joints.len(), sight);
+        let mut parts = vec![None; sight.islands()];
+        for (part, joint) in residents {
+            parts[part].get_or_insert_with(Vec::new).push(joint);
         }
         let mut members = vec![Vec::new(); parts.len()];
         for point in 0..points.len() {
             members[sight.island(point)].push(point);
         }
         let places = |part: usize| -> Vec<Vec3> { members[part].iter().map(|&point| points[point]).collect() };
-        let is_ring = |part: &usize| !parts[*part].is_empty() && rings::bearer(&places(*part), segments).is_some();
+        let ring_bones = RingBones::new(segments);
+        let is_ring = |part: &usize| parts[*part].is_some() && ring_bones.bearer(&places(*part)).is_some();
         let rings: Vec<usize> = sight.parts().filter(is_ring).collect();
         leave_rings(&mut parts, &rings);
-        let mut links = separate_limbs(&mut parts, joints, segments, points, sight);
-        for joint in (0..claims.len()).filter(|&joint| claims[joint]) {
-            if parts.iter().all(|part: &Vec<bool>| part.get(joint) != Some(&true)) {
-                parts.iter_mut().filter_map(|part| part.get_mut(joint)).for_each(|is_home| *is_home = true);
+        let links = separate_limbs(&mut parts, joints, segments, (points, &members), sight);
+        let has_home = at_home_anywhere(&parts, claims.len());
+        for joint in (0..claims.len()).filter(|&joint| claims[joint] && !has_home[joint]) {
+            for part in parts.iter_mut().flatten() {
+                let at = part.partition_point(|&other| other < joint as u32);
+                part.insert(at, joint as u32);
             }
         }
-        adopt(&mut parts, slots, segments, points, sight);
-        let bearers: Vec<usize> = (0..parts.len()).filter(|&part| !parts[part].is_empty()).collect();
+        adopt(&mut parts, slots, segments, sight);
+        if sight.is_crowded(joints.len()) {
+            return Self { slots: slots_beside_flesh, ..Self::default() };
+        }
+        let with_bones: Vec<usize> = (0..parts.len()).filter(|&part| parts[part].is_some()).collect();
+        let boxes = with_bones.iter().filter_map(|&part| sight.corners(part));
+        let boxes: Vec<BoneSegment> = boxes.map(|[head, tail]| BoneSegment { joint: 0, head, tail }).collect();
+        let tree = BoneTree::of_boxes(&boxes);
+        let mut bearers: Vec<usize> = (0..parts.len()).collect();
         let mut lying = vec![false; parts.len()];
-        sight.parts().filter(|_| !bearers.is_empty()).for_each(|part| lying[part] = parts[part].is_empty());
-        for part in sight.parts().filter(|_| !bearers.is_empty()) {
-            if parts[part].is_empty() {
-                let stride = members[part].len().div_ceil(SAMPLES).max(1);
-                let samples = members[part].iter().step_by(stride).map(|&point| points[point]);
-                let bearer = bearer(samples, &bearers, sight);
-                parts[part] = parts[bearer].clone();
-                let of_bearer: Vec<u32> =
-                    links.iter().filter(|(island, _)| *island == bearer).map(|(_, bone)| *bone).collect();
-                links.extend(of_bearer.into_iter().map(|bone| (part, bone)));
-            }
+        for part in sight.parts().filter(|&part| parts[part].is_none() && !with_bones.is_empty()) {
+            let stride = members[part].len().div_ceil(SAMPLES).max(1);
+            let samples = members[part].iter().step_by(stride).map(|&point| points[point]);
+            bearers[part] = bearer(samples, &with_bones, &tree, sight);
+            lying[part] = true;
         }
-        links.sort_unstable();
-        if segments.iter().all(|segment| slots[segment.joint as usize]) {
-            return Self { parts, slots: Vec::new(), links, lying };
-        }
-        // Only now, so that what lies on such a part, as a book in a hand, may be a slot's.
-        for part in bearers {
-            if parts[part].iter().zip(slots).any(|(is_home, is_slot)| *is_home && !is_slot) {
-                parts[part].iter_mut().zip(slots).for_each(|(is_home, is_slot)| *is_home &= !is_slot);
-            }
-        }
-        Self { parts, slots: slots.to_vec(), links, lying }
+        // Not for what lies on such a part, as a book in a hand: it may be a slot's.
+        let has_flesh = parts.iter().map(|part| part.iter().flatten().any(|&joint| !is_slot(joint))).collect();
+        Self { parts, bearers, slots: slots_beside_flesh, has_flesh, links, lying }
     }
 
     /// True if a bone of a joint may hold flesh of an island.
     pub fn may_hold(&self, bone: u32, joint: u32, island: usize) -> bool {
-        self.is_at_home(joint, island) && self.links.binary_search(&(island, bone)).is_err()
+        self.is_at_home(joint, island) && self.links.binary_search(&(self.bearer(island), bone)).is_err()
     }
 
     /// True if an island lies on others, as a hat or a buckle does: it is no flesh about a bone.
@@ -241,10 +241,14 @@ impl Homes {
         self.lying.get(island) == Some(&true)
     }
 
+    fn bearer(&self, island: usize) -> usize {
+        self.bearers.get(island).copied().unwrap_or(island)
+    }
+
     /// True if a joint may hold flesh of an island.
     pub fn is_at_home(&self, joint: u32, island: usize) -> bool {
-        match self.parts.get(island).filter(|part| !part.is_empty()) {
-            Some(part) => part[joint as usize],
+        match self.parts.get(self.bearer(island)).and_then(Option::as_ref) {
+            Some(part) => part.binary_search(&joint).is_ok() && !(self.has_flesh[island] && self.is_slot(joint)),
             None => !self.is_slot(joint),
         }
     }
@@ -255,168 +259,82 @@ impl Homes {
     }
 }
 
-/// Takes the joints from rings that are at home in what a ring is around: a belt lies on the hips, whether more of it is seen from
-/// one thigh or from the other.
-fn leave_rings(parts: &mut [Vec<bool>], rings: &[usize]) {
-    for &ring in rings {
-        let others = (0..parts.len()).filter(|part| rings.binary_search(part).is_err());
-        let others: Vec<usize> = others.filter(|&part| !parts[part].is_empty()).collect();
-        for joint in 0..parts[ring].len() {
-            parts[ring][joint] &= !others.iter().any(|&part| parts[part][joint]);
+/// Parts with the joints that are at home in each: the part encloses the joint, or most of a bone of it. None in a crowd of
+/// parts.
+fn residents(segments: &[BoneSegment], joints: usize, sight: &Sight) -> BTreeSet<(usize, u32)> {
+    let mut residents = BTreeSet::new();
+    for &BoneSegment { joint, head, tail } in segments {
+        let mut near = sight.candidates(head);
+        if head != tail {
+            // A part that encloses most of a bone is around the middle of it.
+            near.extend(sight.candidates(head.midpoint(tail)));
+            near.sort_unstable();
+            near.dedup();
         }
-        if !parts[ring].contains(&true) {
-            parts[ring] = Vec::new();
-        }
-    }
-}
-
-/// Takes the bones of limbs that are parts of their own from the parts of the trunk in which they begin, with all bones below. A
-/// limb is a part of its own if a part holds its first bone and not the joint above it, and if no part of the trunk runs along
-/// that bone, as sleeves and trouser legs do: around half of it at least, and with skin between it and its twin. A robe has no
-/// skin between the legs, and hangs from the hips. A last joint has no bone yet: it runs on as far as the part that holds it alone,
-/// as that of a head which begins in a collar.
-///
-/// Returns the parts of trunks and the bones that lead to a pair of such limbs, sorted: these hold nothing there, as no flesh of
-/// the trunk leads to the limbs. Otherwise hips would hold all of a robe that lies beside the thighs.
-fn separate_limbs(
-    parts: &mut [Vec<bool>],
-    joints: &[WeightJoint],
-    segments: &[BoneSegment],
-    points: &[Vec3],
-    sight: &Sight,
-) -> Vec<(usize, u32)> {
-    /// Share of a bone that a sleeve is around.
-    const SLEEVE: f32 = 0.5;
-    let mut bones: Vec<Vec<&BoneSegment>> = vec![Vec::new(); joints.len()];
-    for segment in segments.iter().filter(|segment| segment.head != segment.tail) {
-        bones[segment.joint as usize].push(segment);
-    }
-    let is_home = |parts: &[Vec<bool>], part: usize, joint: usize| parts[part].get(joint) == Some(&true);
-    let mut gone = vec![vec![false; joints.len()]; parts.len()];
-    let mut links = Vec::new();
-    let (order, children) = parents_first(joints);
-    for joint in order {
-        let Some(parent) = joints[joint].parent else { continue };
-        let homes: Vec<usize> = (0..parts.len()).filter(|&part| is_home(parts, part, joint)).collect();
-        let (left, kept): (Vec<usize>, Vec<usize>) = homes.iter().copied().partition(|&part| gone[part][parent]);
-        if !left.is_empty() && !kept.is_empty() {
-            left.iter().for_each(|&part| gone[part][joint] = true);
-            continue;
-        }
-        let (trunk, others): (Vec<usize>, Vec<usize>) =
-            homes.into_iter().partition(|&part| is_home(parts, part, parent));
-        if trunk.is_empty() || others.is_empty() {
-            continue;
-        }
-        let bone = match bones[joint][..] {
-            [bone] => *bone,
-            [] if children[joint].is_empty() => last_bone(joint, parent, joints, &others, points, sight),
-            _ => continue,
-        };
-        let around = |part: usize| share(bone.head, bone.tail, |place| sight.is_within(part, place));
-        if bone.head == bone.tail || !others.iter().any(|&part| around(part) >= AT_HOME) {
-            continue;
-        }
-        let twins: Vec<&BoneSegment> = (0..joints.len())
-            .filter(|&other| are_twins(joints, &bones, joint, other))
-            .map(|other| bones[other][0])
-            .collect();
-        let is_sleeve = |part: usize| {
-            let skin_between = |twin: &&BoneSegment| {
-                (0..STATIONS).map(|i| (i as f32 + 0.5) / STATIONS as f32).any(|along| {
-                    let (from, to) = (bone.head.lerp(bone.tail, along), twin.head.lerp(twin.tail, along));
-                    sight.is_within(part, from) && sight.is_between(part, from, to)
-                })
-            };
-            around(part) >= SLEEVE && twins.iter().all(skin_between)
-        };
-        if !trunk.iter().any(|&part| is_sleeve(part)) {
-            trunk.iter().for_each(|&part| gone[part][joint] = true);
-            if !twins.is_empty() {
-                let ends = (joints[parent].head, joints[joint].head);
-                let leads = |bone: &usize| (segments[*bone].head, segments[*bone].tail) == ends;
-                let leading = (0..segments.len()).filter(leads);
-                links.extend(leading.flat_map(|bone| trunk.iter().map(move |&part| (part, bone as u32))));
+        for part in near {
+            let is_within = |place| sight.is_within(part, place);
+            if residents.contains(&(part, joint)) {
+                continue;
+            }
+            if is_within(head) || head != tail && share(head, tail, is_within) >= AT_HOME {
+                residents.insert((part, joint));
+            }
+            if sight.is_crowded(joints) {
+                return BTreeSet::new();
             }
         }
     }
-    for (homes, gone) in parts.iter_mut().zip(gone) {
-        homes.iter_mut().zip(gone).for_each(|(is_home, gone)| *is_home &= !gone);
+    residents
+}
+
+/// Flag of each joint: whether it is at home in a part.
+fn at_home_anywhere(parts: &[Option<Vec<u32>>], joints: usize) -> Vec<bool> {
+    let mut has_home = vec![false; joints];
+    parts.iter().flatten().flatten().for_each(|&joint| has_home[joint as usize] = true);
+    has_home
+}
+
+/// Takes the joints from rings that are at home in what a ring is around: a belt lies on the hips, whether more of it is seen from
+/// one thigh or from the other.
+fn leave_rings(parts: &mut [Option<Vec<u32>>], rings: &[usize]) {
+    let others = (0..parts.len()).filter(|part| rings.binary_search(part).is_err());
+    let elsewhere: BTreeSet<u32> = others.filter_map(|part| parts[part].as_ref()).flatten().copied().collect();
+    for &ring in rings {
+        let joints = parts[ring].take().into_iter().flatten();
+        let joints: Vec<u32> = joints.filter(|joint| !elsewhere.contains(joint)).collect();
+        parts[ring] = (!joints.is_empty()).then_some(joints);
     }
-    // A joint that leads to limbs alone holds the trunk by these bones.
-    links.sort_unstable();
-    let leads = |part: usize, bone: usize| links.binary_search(&(part, bone as u32)).is_ok();
-    let has_other =
-        |part: usize, joint: u32| (0..segments.len()).any(|bone| segments[bone].joint == joint && !leads(part, bone));
-    links.iter().copied().filter(|(part, bone)| has_other(*part, segments[*bone as usize].joint)).collect()
-}
-
-/// The bone of a last joint below `parent`, straight on and nearly as far as the farthest of some parts reaches.
-fn last_bone(
-    joint: usize,
-    parent: usize,
-    joints: &[WeightJoint],
-    parts: &[usize],
-    points: &[Vec3],
-    sight: &Sight,
-) -> BoneSegment {
-    let head = joints[joint].head;
-    let onwards = (head - joints[parent].head).normalize_or_zero();
-    let members = (0..points.len()).filter(|&point| parts.contains(&sight.island(point)));
-    let reach = members.map(|point| (points[point] - head).dot(onwards)).fold(0f32, f32::max);
-    BoneSegment { joint: joint as u32, head, tail: head + onwards * reach * LEAF_REACH }
-}
-
-/// True if two joints have one bone each, of about the same length and direction, and hang on one joint or on joints that do.
-fn are_twins(joints: &[WeightJoint], bones: &[Vec<&BoneSegment>], joint: usize, other: usize) -> bool {
-    /// Lengths that differ by more than this share are not a pair's.
-    const ALIKE: f32 = 0.2;
-    let above = |joint: usize| joints[joint].parent;
-    let of_one = |a: Option<usize>, b: Option<usize>| a.is_some() && a == b;
-    let are_beside =
-        of_one(above(joint), above(other)) || of_one(above(joint).and_then(above), above(other).and_then(above));
-    let ([bone], [twin]) = (&bones[joint][..], &bones[other][..]) else { return false };
-    let (way, twin_way) = (bone.tail - bone.head, twin.tail - twin.head);
-    let (length, twin_length) = (way.length(), twin_way.length());
-    let is_alike = (length - twin_length).abs() <= ALIKE * length.max(twin_length);
-    joint != other && are_beside && is_alike && way.dot(twin_way) > 0.5 * length * twin_length
 }
 
 /// Gives parts that enclose no bone to the bones at home nowhere that run through their boxes: shells of plates and bars enclose
 /// nothing, and without this a mechanical head would go with the neck that it stands on. Slots and last joints take no such part.
-fn adopt(parts: &mut [Vec<bool>], slots: &[bool], segments: &[BoneSegment], points: &[Vec3], sight: &Sight) {
-    let has_home = |joint: usize| parts.iter().any(|part| part.get(joint) == Some(&true));
+fn adopt(parts: &mut [Option<Vec<u32>>], slots: &[bool], segments: &[BoneSegment], sight: &Sight) {
+    let has_home = at_home_anywhere(parts, slots.len());
     let is_homeless = |segment: &&BoneSegment| {
         let joint = segment.joint as usize;
-        segment.head != segment.tail && !slots[joint] && !has_home(joint)
+        segment.head != segment.tail && !slots[joint] && !has_home[joint]
     };
-    let homeless: Vec<&BoneSegment> = segments.iter().filter(is_homeless).collect();
-    if homeless.is_empty() {
-        return;
+    let mut adopted = BTreeSet::new();
+    for &BoneSegment { joint, head, tail } in segments.iter().filter(is_homeless) {
+        for part in sight.boxes_around(head.midpoint(tail)).into_iter().filter(|&part| parts[part].is_none()) {
+            let is_within = |[low, high]: [Vec3; 2]| {
+                share(head, tail, |place| place.cmpge(low).all() && place.cmple(high).all()) >= AT_HOME
+            };
+            if sight.corners(part).is_some_and(is_within) {
+                adopted.insert((part, joint));
+            }
+        }
+        if sight.is_crowded(slots.len()) {
+            return;
+        }
     }
-    let mut boxes = vec![(Vec3::INFINITY, Vec3::NEG_INFINITY); parts.len()];
-    for (index, &point) in points.iter().enumerate() {
-        let (low, high) = &mut boxes[sight.island(index)];
-        (*low, *high) = (low.min(point), high.max(point));
-    }
-    for part in sight.parts() {
-        if !parts[part].is_empty() {
-            continue;
-        }
-        let (low, high) = boxes[part];
-        let is_within = |place: Vec3| place.cmpge(low).all() && place.cmple(high).all();
-        let mut at_home = vec![false; slots.len()];
-        for segment in &homeless {
-            at_home[segment.joint as usize] |= share(segment.head, segment.tail, is_within) >= AT_HOME;
-        }
-        if at_home.contains(&true) {
-            parts[part] = at_home;
-        }
+    for (part, joint) in adopted {
+        parts[part].get_or_insert_with(Vec::new).push(joint);
     }
 }
 
 /// The share of samples between two places for which something holds.
-fn share(from: Vec3, to: Vec3, holds: impl Fn(Vec3) -> bool) -> f32 {
+pub(super) fn share(from: Vec3, to: Vec3, holds: impl Fn(Vec3) -> bool) -> f32 {
     let station = |i: usize| from.lerp(to, (i as f32 + 0.5) / STATIONS as f32);
     (0..STATIONS).filter(|&i| holds(station(i))).count() as f32 / STATIONS as f32
 }
@@ -439,14 +357,21 @@ pub(super) fn parents_first(joints: &[WeightJoint]) -> (Vec<usize>, Vec<Vec<usiz
     (order, children)
 }
 
-/// The part that most of some places are nearest to, of those with bones; the first of several.
-fn bearer(places: impl Iterator<Item = Vec3>, bearers: &[usize], sight: &Sight) -> usize {
-    let mut votes = vec![0usize; bearers.len()];
+/// The part that most of some places are nearest to, of those with bones; the first of several. `tree` has their boxes.
+fn bearer(places: impl Iterator<Item = Vec3>, bearers: &[usize], tree: &BoneTree, sight: &Sight) -> usize {
+    /// Parts that are compared for one place.
+    const MOST: usize = 256;
+    let mut votes: BTreeMap<usize, usize> = BTreeMap::new();
+    let mut near = Vec::new();
     for place in places {
-        let distances = bearers.iter().map(|&part| sight.distance(part, place));
-        let nearest = distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
-        nearest.into_iter().for_each(|(bearer, _)| votes[bearer] += 1);
+        let mut compared = 0;
+        let distance = |bearer: u32| {
+            compared += 1;
+            if compared > MOST { f32::INFINITY } else { sight.distance(bearers[bearer as usize], place) }
+        };
+        tree.nearest(place, 0.0, distance, &mut near);
+        *votes.entry(near.first().map_or(0, |nearest| nearest.1 as usize)).or_default() += 1;
     }
-    let most = votes.iter().copied().max();
-    bearers[votes.iter().position(|&count| Some(count) == most).unwrap_or(0)]
+    let most = votes.into_iter().max_by(|a, b| a.1.cmp(&b.1).then(b.0.cmp(&a.0)));
+    bearers[most.map_or(0, |(bearer, _)| bearer)]
 }
