@@ -37,7 +37,7 @@ fn tilted_heads_have_axes_of_their_own() {
     let truth = truth(&folder);
     for name in ["ict_neutral", "ict_identity_3"] {
         let (points, triangles) = mesh(&folder.join(format!("heads/{name}.obj")));
-        for (tilt, turn) in [(20.0f32, 0.0f32), (0.0, 30.0), (10.0, 10.0)] {
+        for (tilt, turn) in [(20.0f32, 0.0f32), (-15.0, 0.0), (0.0, 30.0), (10.0, 10.0), (15.0, -15.0)] {
             let rotation = Quat::from_rotation_y(turn.to_radians()) * Quat::from_rotation_z(tilt.to_radians());
             let turned: Mesh = (points.iter().map(|point| rotation * *point).collect(), triangles.clone());
             let (analysis, errors) = errors(&turned, &truth);
@@ -46,7 +46,7 @@ fn tilted_heads_have_axes_of_their_own() {
             // The direction across the face: a head may nod.
             let left = analysis.axes.up.cross(analysis.axes.forward);
             let off = left.angle_between(rotation * Vec3::X).to_degrees();
-            assert!(off < 4.0, "{told}: axes are off by {off} degrees");
+            assert!(off < 5.0, "{told}: axes are off by {off} degrees");
         }
     }
 }

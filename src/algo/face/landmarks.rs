@@ -102,7 +102,7 @@ pub const fn mirrored(index: usize) -> usize {
 /// front gets landmarks; on anything but a human face their [`confidence`](Landmarks::confidence) is low.
 ///
 /// Takes about 5 ms at 11,000 points and 15 ms at 45,000 for a head that is exactly symmetric, twice that for another,
-/// and up to eight times that where no face is clear at first.
+/// and up to twelve times that where no face is clear at first.
 ///
 /// # Errors
 /// [`LandmarkError`] for a point that is not finite, no skin, skin without depth, and where nothing can be laid onto
@@ -136,11 +136,25 @@ pub fn find_landmarks(points: &[Vec3], triangles: &[[u32; 3]], shells: &Shells) 
     let sure = |found: &Result<Sighting, LandmarkError>| found.as_ref().map_or(-1.0, |found| found.0.confidence);
     if sure(&best) < 0.5 {
         // The face may be turned aside or tilted. A mesh that is hardly a face from any side is taken in its given orientation.
-        let turns = [-14.0f32, 14.0, -28.0, 28.0].map(|degrees| (Vec3::Y, degrees));
-        let tilts = [-14.0f32, 14.0].map(|degrees| (Vec3::Z, degrees));
-        for (axis, degrees) in turns.into_iter().chain(tilts) {
+        let about = |axis: Vec3, degrees: f32| {
             let half = degrees.to_radians() / 2.0;
-            let next = attempt(Quat::from_vec4((axis * ops::sin(half)).extend(ops::cos(half))));
+            Quat::from_vec4((axis * ops::sin(half)).extend(ops::cos(half)))
+        };
+        let turned = [-14.0f32, 14.0, -28.0, 28.0].map(|turn| about(Vec3::Y, turn));
+        let tilted = [-14.0f32, 14.0].map(|tilt| about(Vec3::Z, tilt));
+        let both = [(-14.0f32, 14.0f32), (14.0, -14.0), (14.0, 14.0), (-14.0, -14.0)];
+        let both = both.map(|(turn, tilt)| about(Vec3::Y, turn) * about(Vec3::Z, tilt));
+        for rotation in turned.into_iter().chain(tilted) {
+            let next = attempt(rotation);
+            if sure(&next) > sure(&best).max(0.2) + 0.1 {
+                best = next;
+            }
+        }
+        for rotation in both {
+            if sure(&best) >= 0.5 {
+                break;
+            }
+            let next = attempt(rotation);
             if sure(&next) > sure(&best).max(0.2) + 0.1 {
                 best = next;
             }
