@@ -11,10 +11,6 @@ const SOLE: f32 = 0.1;
 /// hooves are shorter.
 const PAW: f32 = 0.33;
 const WHOLE_SOLE: f32 = 0.42;
-/// Distance by which the ankle lies behind the straight way from the knee to the leg over the foot, as a share of that height, up
-/// to which it may be the heel of a sole, and from which on it is a hock, however large the paw under it is.
-const STRAIGHT: f32 = 0.02;
-const HOCK: f32 = 0.06;
 /// Length of a block over the standard deviation of places in it.
 const BLOCK: f32 = 3.464;
 /// Places of the ankle, the ball and the toes, as shares of the foot's length from the heel and over the ground.
@@ -45,7 +41,7 @@ impl Work<'_> {
             let arc = arc_of[node] as usize;
             arc != leaf && self.hypothesis.leaves.contains(&Some(arc))
         };
-        let mut open: Vec<usize> = leg.iter().copied().filter(|&node| is_low(node)).collect();
+        let mut open: Vec<usize> = leg.into_iter().filter(|&node| is_low(node)).collect();
         let mut is_foot = vec![false; centres.len()];
         open.iter().for_each(|&node| is_foot[node] = true);
         while let Some(node) = open.pop() {
@@ -63,15 +59,8 @@ impl Work<'_> {
         let middle = foot.iter().sum::<Vec3>() / foot.len() as f32;
         let variance = foot.iter().map(|place| (*place - middle).dot(forward)).map(|away| away * away).sum::<f32>();
         let length = BLOCK * (variance / foot.len() as f32).sqrt();
+        let share = ((length / tall - PAW) / (WHOLE_SOLE - PAW)).clamp(0.0, 1.0);
         let (Some(above), Some(bend), Some(before)) = (places[hip], places[knee], places[ankle]) else { return };
-        let is_shank = |place: &&Vec3| (SOLE..2.0 * SOLE).contains(&((place.dot(up) - ground) / tall));
-        let shank: Vec<Vec3> = leg.iter().map(|&node| &centres[node]).filter(is_shank).copied().collect();
-        let over_foot = shank.iter().sum::<Vec3>() / shank.len().max(1) as f32;
-        let way = over_foot - bend;
-        let straight = bend + way * ((before - bend).dot(up) / way.dot(up).min(-1e-6)).clamp(0.0, 1.0);
-        let jut = if shank.is_empty() { 0.0 } else { (straight - before).dot(forward) / tall };
-        let is_hock = ((jut - STRAIGHT) / (HOCK - STRAIGHT)).clamp(0.0, 1.0);
-        let share = ((length / tall - PAW) / (WHOLE_SOLE - PAW)).clamp(0.0, 1.0) * (1.0 - is_hock);
         let back = middle.dot(forward) - 0.5 * length;
         for (joint, (along, high)) in [ankle, ball, toes].into_iter().zip(FOOT) {
             let on_sole = left * middle.dot(left) + up * (ground + high * length) + forward * (back + along * length);

@@ -175,11 +175,10 @@ impl Form {
 pub type NamedForm = (&'static str, &'static [Change], Option<usize>);
 
 /// Forms on which rules were chosen.
-pub const KNOWN: [NamedForm; 15] = [
+pub const KNOWN: [NamedForm; 14] = [
     ("long legs", &[Change::Legs(1.5)], None),
     ("grazing", &[Change::Nod(20.0), Change::Neck(-75.0, 1.2)], None),
     ("big head", &[Change::Head(1.6)], None),
-    ("few faces", &[], Some(800)),
     ("wide", &[Change::Width(1.5), Change::Belly(1.15)], None),
     ("tail up", &[Change::Tail(60.0, 70.0, 0.8, 1.0)], None),
     ("short tail", &[Change::Tail(0.0, 0.0, 0.25, 0.8)], None),
