@@ -168,7 +168,7 @@ fn a_character_that_could_not_be_written_is_written_as_soon_as_it_can_be() {
     assert!(watch.ended());
 }
 
-/// What cannot be written for the same reason as before is not read and built again meanwhile: a part that is missing for a
+/// A character that cannot be written for the same reason as before is not read and built again meanwhile: a part that is missing for a
 /// while is told only once there is a place to write to.
 #[test]
 fn a_character_is_made_again_only_when_it_may_be_written() {

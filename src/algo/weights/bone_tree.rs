@@ -31,7 +31,7 @@ impl BoneTree {
         Self::build(bones, false)
     }
 
-    /// The same over boxes, of which each "bone" is a diagonal. Flat boxes over each other are split across, however they lie.
+    /// Tree over boxes, of which each "bone" is a diagonal. Flat boxes over each other are split across, however they lie.
     pub fn of_boxes(diagonals: &[BoneSegment]) -> Self {
         Self::build(diagonals, true)
     }

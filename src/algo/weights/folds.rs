@@ -11,7 +11,7 @@ use super::{bone::BoneSegment, sight::Sight};
 
 /// One minus the cosine of the least bend that is a fold: 53 degrees.
 const BENT: f32 = 0.4;
-/// The same of the bend from which on folds have their full strength: 66 degrees.
+/// One minus the cosine of the bend from which on folds have their full strength: 66 degrees.
 const FOLDED: f32 = 0.6;
 
 /// Fold between a bone and another one, which may hold the skin on its inside.

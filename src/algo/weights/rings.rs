@@ -57,7 +57,7 @@ impl<'a> RingBones<'a> {
     }
 }
 
-/// What is summed over places once, to find most of the bones that they are no ring around from a few of them.
+/// Sums over places, taken once to find most of the bones that they are no ring around from a few of them.
 struct Outline<'a> {
     places: &'a [Vec3],
     middle: Vec3,

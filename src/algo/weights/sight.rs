@@ -257,7 +257,7 @@ fn encloses(surface: &Surface, point: Vec3) -> bool {
     enclosure(surface, point).0
 }
 
-/// Whether a surface is around `point`, and the number of crossings that tell it.
+/// Flag of whether a surface is around `point`, and the number of crossings that tell it.
 fn enclosure(surface: &Surface, point: Vec3) -> (bool, u64) {
     let (mut winding, mut odd, mut crossings) = (0i32, 0usize, 0);
     let mut hits = Vec::new();

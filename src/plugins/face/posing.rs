@@ -53,9 +53,9 @@ struct RunningPose {
 
 /// Poses of a request.
 enum PoseWork {
-    /// They are computed in the background.
+    /// Poses that are computed in the background.
     Task(Task<Vec<BonePose>>),
-    /// They are known, and shown in the next frame.
+    /// Poses that are known, and shown in the next frame.
     Ready(Vec<BonePose>),
 }
 

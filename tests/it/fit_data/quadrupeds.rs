@@ -1,4 +1,5 @@
-//! Animals on all fours of other forms: foxes and dogs with other legs, necks, heads, tails and trunks, and in other poses, as horses,
+//! Animals on all fours of other forms: foxes and dogs with other legs, necks, heads, tails and trunks, and in other poses, as
+//! horses, giraffes, bears, lizards and dinosaurs have them.
 
 mod forms;
 
