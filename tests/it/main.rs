@@ -95,7 +95,6 @@ mod face_eyes;
 mod face_fit;
 mod face_grouping;
 mod face_landmarks;
-mod face_orientation;
 mod face_symmetry;
 mod face_teeth;
 mod face_units;
