@@ -23,7 +23,7 @@ const KNOWN_BOUNDS: [(&str, [f32; 2]); 14] = [
     ("tail up", [3.9, 3.5]),
     ("short tail", [3.6, 5.0]),
     ("giraffe", [4.0, 4.5]),
-    ("lizard", [5.3, 4.8]),
+    ("lizard", [5.3, 5.9]),
     ("walk", [3.7, 4.5]),
     ("hanging tail", [4.3, 4.2]),
     ("stalk", [7.3, 5.4]),
