@@ -33,3 +33,33 @@ pub fn keep_strongest_alike(influences: &mut Vec<(u32, f32)>, most: usize, least
     }
     keep_strongest(influences, most, least);
 }
+
+/// Share of the strongest influence that is left out by which those that stay are weakened.
+const SOFTNESS: f32 = 0.5;
+
+/// Keeps the strongest influences of a point as [`keep_strongest_alike`] does, and weakens each of them by half of the strongest
+/// one that is left out, before they are made to sum to one.
+///
+/// Along a surface, one influence after the other becomes the one that is left out, which makes a step in the weights; so it is
+/// half as high. The influence of the joint `held` keeps its weight if it is one of the strongest.
+pub fn keep_strongest_softly(influences: &mut Vec<(u32, f32)>, most: usize, least: f32, held: Option<u32>) {
+    keep_strongest(influences, usize::MAX, 0.0);
+    let most = most.max(1);
+    let place = influences.iter().take(most).position(|(joint, _)| Some(*joint) == held);
+    let kept = place.map(|place| influences.remove(place));
+    let others = most - usize::from(kept.is_some());
+    if let Some((_, next)) = influences.get(others).copied() {
+        let sum = |influences: &[(u32, f32)]| influences.iter().map(|(_, weight)| *weight).sum::<f32>();
+        let all = sum(influences);
+        influences.truncate(others);
+        let fewest = usize::from(kept.is_none());
+        while influences.len() > fewest && influences.last().is_some_and(|(_, last)| *last <= next * (1.0 + ALIKE)) {
+            influences.pop();
+        }
+        influences.iter_mut().for_each(|(_, weight)| *weight -= SOFTNESS * next);
+        let scale = all / sum(influences);
+        influences.iter_mut().for_each(|(_, weight)| *weight *= scale);
+    }
+    influences.extend(kept);
+    keep_strongest(influences, most, least);
+}

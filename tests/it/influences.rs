@@ -1,7 +1,7 @@
 //! Influences of one point: how many stay, in which order, and that they sum to one.
 
 use proptest::prelude::*;
-use rigsmith::mesh::influences::keep_strongest;
+use rigsmith::mesh::influences::{keep_strongest, keep_strongest_softly};
 
 fn kept_influences(influences: &[(u32, f32)], most: usize, least: f32) -> Vec<(u32, f32)> {
     let mut influences = influences.to_vec();
@@ -28,11 +28,35 @@ fn what_is_no_weight_is_left_out() {
     assert_eq!(kept_influences(&[(0, f32::MIN_POSITIVE), (1, f32::MIN_POSITIVE)], 4, 0.0), [(0, 0.5), (1, 0.5)]);
 }
 
+fn soft_influences(influences: &[(u32, f32)], most: usize, held: Option<u32>) -> Vec<(u32, f32)> {
+    let mut influences = influences.to_vec();
+    keep_strongest_softly(&mut influences, most, 0.0, held);
+    influences
+}
+
+#[test]
+fn the_one_that_is_left_out_weakens_the_others() {
+    let all = [(7, 0.5), (3, 0.25), (5, 0.125), (6, 0.125)];
+    assert_eq!(soft_influences(&all, 4, None), kept_influences(&all, 4, 0.0), "nothing is left out");
+    // Half of an eighth is taken from a half and a quarter.
+    assert_eq!(soft_influences(&all, 2, None), [(7, 0.7), (3, 0.3)]);
+    // Of the half that the others have, the quarter is all that stays.
+    assert_eq!(soft_influences(&all, 2, Some(7)), [(3, 0.5), (7, 0.5)]);
+    assert_eq!(soft_influences(&all, 1, Some(7)), [(7, 1.0)]);
+    assert_eq!(soft_influences(&all, 1, Some(6)), [(7, 1.0)], "a weak one is not held");
+    // Equally strong ones stay or go together.
+    assert_eq!(soft_influences(&all, 3, None), [(7, 0.7), (3, 0.3)]);
+    assert_eq!(soft_influences(&[(1, 0.5), (2, 0.5)], 1, None), [(1, 1.0)]);
+}
+
 proptest! {
     #[test]
     fn they_are_sorted_and_whole(
         influences in prop::collection::vec((0u32..50, 1e-30f32..1e30), 1..20), most in 1usize..9, least in 0.0f32..0.2,
     ) {
+        let soft = soft_influences(&influences, most, Some(influences[0].0));
+        prop_assert!((soft.iter().map(|(_, weight)| f64::from(*weight)).sum::<f64>() - 1.0).abs() < 1e-5);
+        prop_assert!((1..=most).contains(&soft.len()));
         let found = kept_influences(&influences, most, least);
         prop_assert!((1..=most).contains(&found.len()));
         prop_assert!(found.windows(2).all(|pair| pair[0].1 >= pair[1].1));

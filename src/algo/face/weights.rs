@@ -23,7 +23,7 @@ use super::{
 };
 use crate::{
     algo::weights::laplacian::Graph,
-    mesh::{adjacency::weld, influences::keep_strongest_alike, model::Weights},
+    mesh::{adjacency::weld, influences::keep_strongest_softly, model::Weights},
 };
 
 pub(crate) use symmetry::Mirror;
@@ -168,7 +168,7 @@ pub fn face_weights(
     let sides = sides::Sides::new(&face);
     let mut rows = skin::rows(&face, &sides, progress)?;
     let stiff = interior::rows(&face, &sides, &shell, &kinds, &mut rows);
-    rows.iter_mut().for_each(|row| finish(row, most));
+    rows.iter_mut().for_each(|row| finish(row, most, jaw));
     if !progress(1.0) {
         return Err(FaceWeightsError::Cancelled);
     }
@@ -187,9 +187,10 @@ pub fn face_weights(
 /// The influences of one vertex.
 pub(crate) type Row = Vec<(u32, f32)>;
 
-/// Keeps the strongest influences of a vertex; one without any belongs to the head.
-fn finish(row: &mut Row, most: usize) {
-    keep_strongest_alike(row, most, PRUNE);
+/// Keeps the strongest influences of a vertex, and the share of the jaw, which all skin around has; a vertex without any belongs to
+/// the head.
+fn finish(row: &mut Row, most: usize, jaw: Option<u32>) {
+    keep_strongest_softly(row, most, PRUNE, jaw);
     if row.is_empty() {
         row.push((HEAD, 1.0));
     }

@@ -5,7 +5,14 @@ use std::{cmp::Reverse, collections::BinaryHeap};
 use glam::Vec3;
 
 use super::{Face, smooth};
-use crate::algo::face::bones::{FaceBoneKind, Region, map::line_distance};
+use crate::algo::{
+    face::bones::{FaceBoneKind, Region, map::line_distance},
+    weights::ldl::{LANES, Lane, Ldl, Symmetric},
+};
+
+/// Distance along the surface, as a share of the face's scale, over which the upper rim goes over into the lower one in the corners
+/// of each opening, where both are one skin.
+const CORNERS: [f32; OPENINGS] = [0.03, 0.1, 0.1];
 
 /// Upper or lower rim of lips or lids.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,6 +32,9 @@ pub(crate) const OPENINGS: usize = 3;
 pub(crate) struct Sides {
     /// Rim of each vertex, by opening.
     rims: [Vec<Rim>; OPENINGS],
+    /// Share of the lower rim at each vertex, by opening: 1 on the lower one, and smoothly less to 0 on the upper one in the
+    /// corners.
+    lower: [Vec<f32>; OPENINGS],
     /// Rim of each bone, by opening.
     bones: Vec<[Rim; OPENINGS]>,
 }
@@ -39,7 +49,8 @@ impl Sides {
         let mut rims = [vec![Rim::None; n], vec![Rim::None; n], vec![Rim::None; n]];
         let mut bones = vec![[Rim::None; OPENINGS]; face.bones.len()];
         if !face.map.trusted {
-            return Self { rims, bones };
+            let lower = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
+            return Self { rims, lower, bones };
         }
         for (opening, rims) in rims.iter_mut().enumerate().skip(usize::from(!face.lips_part)) {
             let zone = Zone::new(face, opening);
@@ -61,7 +72,13 @@ impl Sides {
                 rim[opening] = nearest.map_or(Rim::None, |v| rims[v]);
             }
         }
-        Self { rims, bones }
+        let lower = [0, 1, 2].map(|opening| lower_shares(face, &rims[opening], opening));
+        Self { rims, lower, bones }
+    }
+
+    /// Share of the lower lip at a vertex of a lip, 0 to 1; 0 elsewhere.
+    pub fn lower_lip(&self, vertex: usize) -> f32 {
+        self.lower[0][vertex]
     }
 
     /// Lip of a vertex.
@@ -84,12 +101,16 @@ impl Sides {
     pub fn keep(&self, face: &Face, vertex: usize, bone: usize) -> f32 {
         let mut keep = 1.0;
         for opening in 0..OPENINGS {
-            match (self.bones[bone][opening], self.rims[opening][vertex]) {
-                (Rim::Upper, Rim::Lower) | (Rim::Lower, Rim::Upper) => {
-                    keep *= 1.0 - inset(face, opening, face.places[vertex]);
-                }
-                _ => {}
+            if self.rims[opening][vertex] == Rim::None {
+                continue;
             }
+            let lower = self.lower[opening][vertex];
+            let across = match self.bones[bone][opening] {
+                Rim::None => continue,
+                Rim::Upper => lower,
+                Rim::Lower => 1.0 - lower,
+            };
+            keep *= 1.0 - across * inset(face, opening, face.places[vertex]);
         }
         keep
     }
@@ -211,6 +232,46 @@ fn flood(face: &Face, zone: &Zone, rims: &mut [Rim]) {
             }
         }
     }
+}
+
+/// Share of the lower rim at each vertex: what the rims say, spread by heat along the surface over [`CORNERS`].
+fn lower_shares(face: &Face, rims: &[Rim], opening: usize) -> Vec<f32> {
+    let mut shares: Vec<f32> = rims.iter().map(|rim| f32::from(u8::from(*rim == Rim::Lower))).collect();
+    let inside: Vec<usize> = (0..rims.len()).filter(|&v| rims[v] != Rim::None).collect();
+    if inside.is_empty() {
+        return shares;
+    }
+    let mut index = vec![u32::MAX; rims.len()];
+    inside.iter().enumerate().for_each(|(i, &v)| index[v] = i as u32);
+    let areas: Vec<f64> = inside.iter().map(|&v| f64::from(face.graph.areas[v])).collect();
+    let least = (1e-3 * areas.iter().sum::<f64>() / areas.len() as f64).max(1e-30);
+    let width = f64::from(CORNERS[opening] * face.map.scale);
+    let mut matrix = Symmetric { starts: vec![0], columns: Vec::new(), values: Vec::new(), diagonal: Vec::new() };
+    for (&v, area) in inside.iter().zip(&areas) {
+        let mut diagonal = area.max(least);
+        for (other, weight) in face.graph.of(v).filter(|(other, _)| index[*other] != u32::MAX) {
+            let flow = width * width * f64::from(weight);
+            diagonal += flow;
+            matrix.columns.push(index[other]);
+            matrix.values.push(-flow);
+        }
+        matrix.starts.push(matrix.columns.len() as u32);
+        matrix.diagonal.push(diagonal);
+    }
+    // Without a factor, rims stay as they are.
+    let Some(factor) = Ldl::new(&matrix) else { return shares };
+    let row = |&at: &u32| {
+        let at = at as usize;
+        let mut lane = [0.0; LANES];
+        lane[0] = areas[at].max(least) * f64::from(shares[inside[at]]);
+        lane
+    };
+    let mut lanes: Vec<Lane> = factor.order().iter().map(row).collect();
+    factor.solve(&mut lanes);
+    for (lane, &at) in lanes.iter().zip(factor.order()) {
+        shares[inside[at as usize]] = (lane[0] as f32).clamp(0.0, 1.0);
+    }
+    shares
 }
 
 /// Non-negative float as an integer with the same order, for the heap.

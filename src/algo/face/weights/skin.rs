@@ -82,8 +82,8 @@ pub(crate) fn rows(
                 }
                 None if column == bones.len() + 1 => {
                     // Between the corners, inner walls that follow the jaw end at the upper lip.
-                    let is_upper = sides.lip(v) == Rim::Upper;
-                    let kept = if is_upper { 1.0 - inset(face, 0, face.places[v]) } else { 1.0 };
+                    let upper = if sides.lip(v) == Rim::None { 0.0 } else { 1.0 - sides.lower_lip(v) };
+                    let kept = 1.0 - upper * inset(face, 0, face.places[v]);
                     row.push((face.jaw.unwrap_or(HEAD), value * kept));
                 }
                 None => row.push((HEAD, value)),
@@ -141,8 +141,7 @@ fn jaw_share(face: &Face, sides: &Sides, v: usize) -> f32 {
     let corner = half.lip_corner();
     let near = inset(face, 0, p) * smooth(0.35 * e, 0.05 * e, below.abs());
     let own = match sides.lip(v) {
-        Rim::Upper => 0.0,
-        Rim::Lower => 1.0,
+        Rim::Upper | Rim::Lower => sides.lower_lip(v),
         Rim::None if q.z < corner.z - 0.3 * e => share,
         Rim::None => f32::from(u8::from(below > 0.0)),
     };
