@@ -144,10 +144,7 @@ impl Workbench {
 
     /// A workbench with a loaded rig.
     pub fn with_rig(seed: u64, rig: Rig) -> Self {
-        // A rig that was made with the same seed already has its first uids.
-        let known = rig.walk().map(|joint| joint.data.uid).chain([rig.uid()]);
-        let seed = known.fold(seed, |seed, uid| seed.rotate_left(1) ^ uid.0);
-        let mut bench = Self::new(seed, "");
+        let mut bench = Self::new(UidSource::seed_beside(seed, &rig), "");
         let entity = bench.rig;
         bench.app.world_mut().entity_mut(entity).insert(rig);
         bench
