@@ -198,11 +198,11 @@ impl<'d, 'a> Rewriter<'d, 'a> {
         self.inputs();
         self.joints();
         self.poses();
-        let (has_fresh, declared, with_names) = (self.has_fresh(), self.declared, self.with_names);
+        let (has_unsettled, declared, with_names) = (self.has_unsettled(), self.declared, self.with_names);
         let text = self.patch.text();
         // What names were looked up in makes room for what is read to lay joints out.
         drop((self.names, self.index));
-        if has_fresh { settled(text, declared, with_names) } else { text }
+        if has_unsettled { settled(text, declared, with_names) } else { text }
     }
 
     fn header(&mut self) {
