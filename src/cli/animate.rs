@@ -40,7 +40,7 @@ use crate::{
     },
     solve::{
         bake_clip::{BakePlan, BakeSettings, BakedNode},
-        retarget::{MotionTarget, RetargetError},
+        retarget::MotionTarget,
     },
 };
 
@@ -133,12 +133,6 @@ enum PresetArg {
     Unity,
     /// VRM: names such as leftUpperLeg, axes of the model
     Vrm,
-}
-
-impl From<RetargetError> for Failure {
-    fn from(error: RetargetError) -> Self {
-        Self::Input(Box::new(error))
-    }
 }
 
 pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {

@@ -321,7 +321,8 @@ impl ClipCollector<'_> {
             ..RetargetSettings::default()
         };
         let built = animated.built().ok_or(PoseError::NotBuilt)?;
-        let done = spinning("retargeting", || retarget(animated.rig(), built, motion, &map, &settings))?;
+        let done = spinning("retargeting", || retarget(animated.rig(), built, motion, &map, &settings))
+            .map_err(|source| ClipFileError::Retarget { path: path.to_owned(), source })?;
         let RetargetedMotion { clip, keys, stances, touches, unmoved, root, notes } = done;
         report.notes(notes);
         if let Some(root) = root {
