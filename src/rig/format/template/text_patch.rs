@@ -49,10 +49,11 @@ pub fn write_template_over(rig: &Rig, source: &str) -> Option<String> {
 }
 
 fn written_over(rig: &Rig, source: &str) -> Option<String> {
-    let before = read_text(source, 1).ok()?.rig;
+    let mut before = read_text(source, 1).ok()?.rig;
     if before.uid() != rig.uid() {
         return None;
     }
+    share_equal_joints(&mut before, rig);
     let declared = Declarations::find(source)?;
     let mut rewriter = Rewriter::new(rig, &before, &declared);
     header_labels(&mut rewriter.patch, &declared.tree, &before, rig);
