@@ -415,3 +415,44 @@ fn next_serial() -> u64 {
     static NEXT: AtomicU64 = AtomicU64::new(1);
     NEXT.fetch_add(1, Ordering::Relaxed)
 }
+
+#[cfg(test)]
+#[cfg(feature = "cli")]
+mod tests {
+    use glam::{Quat, Vec3};
+
+    use super::*;
+    use crate::rig::BuiltNode;
+
+    #[test]
+    fn places_at_rest_are_those_of_a_state() {
+        let node = |number: usize| BuiltNode {
+            uid: Uid(number as u64 + 1),
+            name: Arc::from("n"),
+            kind: if number % 3 == 2 { NodeType::Null } else { NodeType::Joint },
+            parent: number.checked_sub(1 + number % 2),
+            base: match number % 4 {
+                3 => Trs::IDENTITY,
+                _ => Trs {
+                    translation: Vec3::new(0.1, 0.3 * number as f32, -0.2),
+                    rotation: Quat::from_xyzw(0.6, 0.0, 0.8, 0.0),
+                    scale: Vec3::new(1.0, 2.0, 0.5),
+                },
+            },
+            label: None,
+            group: None,
+            origin: None,
+            control: None,
+            layer: None,
+            attributes: Arc::from([]),
+        };
+        let rig = BuiltRig { nodes: (0..9).map(node).collect(), ..BuiltRig::default() };
+        let (places, height) = RigProgram::places_at_rest(&rig).unwrap();
+        let mut state = RigState::new(Arc::new(RigProgram::compile(&rig, &CompileOptions::default()).unwrap()));
+        state.evaluate(0.0);
+        assert_eq!(places, state.globals());
+        assert_eq!(height, state.program().rest_height());
+        let doubled = BuiltRig { nodes: [0, 0].map(node).into(), ..BuiltRig::default() };
+        assert!(RigProgram::places_at_rest(&doubled).is_err());
+    }
+}

@@ -148,3 +148,38 @@ fn groups(rig: &Rig) -> HashSet<&str> {
 fn clips(rig: &Rig) -> HashSet<&str> {
     rig.clips().iter().map(|clip| clip.name.as_str()).collect()
 }
+
+#[cfg(test)]
+#[cfg(feature = "cli")]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::rig::{JointData, UidSource, operations::Operation};
+
+    fn rig(number: u64, labels: [&str; 2]) -> Rig {
+        let mut rig = Rig::new(Uid(number), "n");
+        for (label, parent) in labels.into_iter().zip([None, Some(Uid(number + 1))]) {
+            let uid = Uid(number + 1 + u64::from(parent.is_some()));
+            let joint = Box::new(JointData { uid, label: Some(label.to_owned()), ..JointData::default() });
+            rig.apply(&RigEdit::AddJoint { joint, parent, index: 0 }).unwrap();
+        }
+        rig
+    }
+
+    #[test]
+    fn owned_rigs_are_merged_as_borrowed_ones() {
+        let first = rig(10, ["a", "b"]);
+        // With uids and labels of their own, with labels of the first, and with its uids.
+        for other in [rig(20, ["c", "d"]), rig(30, ["b", "e"]), rig(10, ["a", "f"])] {
+            let mut borrowed = first.clone();
+            let merge = Operation::Merge { other: Arc::new(other.clone()), parent: Some(Uid(12)) };
+            let outcome = merge.run(&mut borrowed, &mut UidSource::seeded(7), None).unwrap();
+            let (owned, notes) =
+                Operation::merge_owned(first.clone(), other, Some(Uid(12)), &mut UidSource::seeded(7)).unwrap();
+            assert_eq!(owned, borrowed);
+            assert_eq!(notes, outcome.notes);
+            assert_eq!(owned.len(), 4);
+        }
+    }
+}

@@ -160,6 +160,31 @@ fn transforms_and_markers_beyond_their_limits_are_told() {
     }
 }
 
+#[test]
+fn motion_without_frames_and_with_too_many_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("none.bvh"), chain_motion(2, 0)).unwrap();
+    let rig =
+        "(format: 2, name: \"n\", joints: [(label: \"j0\"), (label: \"j1\", parent: \"j0\", translation: (0, 1, 0))])";
+    fs::write(folder.path().join("two.rig.ron"), rig).unwrap();
+    let text = long_clip(10).replace("10.0", "3e38");
+    fs::write(folder.path().join("long.anim.ron"), text).unwrap();
+    fs::write(folder.path().join("empty.ron"), "[Stroke(points: [], joints: 5)]").unwrap();
+    fs::copy(asset("models/head.obj"), folder.path().join("head.obj")).unwrap();
+    let cases: [(&[&str], &[&str]); 3] = [
+        (&["animate", "two.rig.ron", "none.bvh", "-o", "out.glb"], &["none.bvh", "no frames"]),
+        (&["animate", "biped", "long.anim.ron", "-o", "out.glb"], &["slow", "more than a million million frames"]),
+        (&["sketch", "head.obj", "empty.ron", "-o", "out.glb"], &["empty.ron", "no joint", "gesture 1"]),
+    ];
+    for (args, wanted) in cases {
+        let (ended, answer) = json_answer(folder.path(), args);
+        assert_eq!(ended.code, Some(1), "{args:?}: {answer:.600}");
+        let told = explained(&answer);
+        assert!(wanted.iter().all(|part| told.contains(part)), "{args:?}: {told}");
+        assert!(!folder.path().join("out.glb").exists(), "{args:?}");
+    }
+}
+
 /// 20,000 clips of one name and one uid get names and uids of their own.
 #[test]
 fn many_clips_alike_are_added_in_one_step() {
