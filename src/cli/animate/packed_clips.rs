@@ -6,7 +6,7 @@ use super::{AnimateArgs, animated_rig::AnimatedRig, bake_settings, reduction, si
 use crate::{
     cli::{Failure, Report, limits, progress::spinning, report::counted},
     files::{RealDisk, store_packed_clips},
-    headless::{Workanimated, posing::PoseError},
+    headless::posing::PoseError,
     rig::{Rig, animation::RigClip, bake::baked},
     solve::packed_clip::{PackedSkeleton, pack_clip},
 };

@@ -14,7 +14,7 @@ use super::{
 use crate::{
     cli::{Failure, Report, limits, progress::spinning, report::counted},
     files::{FileKind, RealDisk, StagedFile, load_animation, load_joint_map, load_motion, stage_file, stem},
-    headless::{Workanimated, posing::PoseError},
+    headless::{Workbench, posing::PoseError},
     mesh::model::Model,
     rig::{
         Rig, Uid,
@@ -44,7 +44,7 @@ pub(super) fn clips(
     args: &AnimateArgs,
     onto: MotionTarget,
     animated: &mut AnimatedRig,
-    whole: Option<&Workanimated>,
+    whole: Option<&Workbench>,
     report: &mut Report,
 ) -> Result<ClipsWithMap, Failure> {
     let pairs = args.map.as_deref().map(|path| load_joint_map(&RealDisk, path)).transpose()?.unwrap_or_default();
@@ -122,7 +122,7 @@ impl ClipCollector<'_> {
         &mut self,
         path: &Path,
         animated: &mut AnimatedRig,
-        whole: Option<&Workanimated>,
+        whole: Option<&Workbench>,
         report: &mut Report,
     ) -> Result<(), Failure> {
         let read = load_animation(&RealDisk, path)?;
@@ -207,7 +207,7 @@ impl ClipCollector<'_> {
 const SHOWN: usize = 12;
 
 /// A clip of a rig with commands, baked onto its joints alone; `None` if no joint moves.
-fn on_joints(args: &AnimateArgs, clip: &RigClip, rig: &Rig, whole: &Workanimated) -> Result<Option<RigClip>, Failure> {
+fn on_joints(args: &AnimateArgs, clip: &RigClip, rig: &Rig, whole: &Workbench) -> Result<Option<RigClip>, Failure> {
     let places: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
     let place_of: HashMap<Uid, usize> = places.iter().copied().zip(0..).collect();
     let node = |joint: &crate::rig::RigJoint| BakedNode {
