@@ -204,10 +204,12 @@ impl Workbench {
 
     /// Runs one operation as one step of the history.
     pub fn operate(&mut self, operation: Operation) -> Result<(), WorkbenchError> {
-        self.forget_refusals();
-        self.app.world_mut().write_message(EditRequest::operation(self.rig, operation));
+        let request = self.app.world_mut().write_message(EditRequest::operation(self.rig, operation));
         self.app.update();
-        self.refused().map_or(Ok(()), Err)
+        // Writes to entities may be refused in the same frame.
+        let mut refusals = self.app.world_mut().resource_mut::<Messages<EditRefusal>>();
+        let refused = refusals.drain().find(|refusal| refusal.request.is_some() && refusal.request == request);
+        refused.map_or(Ok(()), |refusal| Err(refusal.reason.into()))
     }
 
     /// Carries out gestures and returns an answer for each. Where the time of [`Workbench::set_limits`] is over,
