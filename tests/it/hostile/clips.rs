@@ -76,8 +76,12 @@ fn motion_of_few_joints_on_a_rig_of_many_stays_within_its_memory() {
     let rig = format!("(format: 2, name: \"star\", joints: [(label: \"j0\"), {}])", joints.join(", "));
     fs::write(folder.path().join("star.rig.ron"), rig).unwrap();
     fs::write(folder.path().join("chain.bvh"), chain_motion(100, 300)).unwrap();
-    let files = ["star.rig.ron", "chain.bvh"];
-    check(folder.path(), &[(&files[..], &["animate", files[0], files[1], "-o", "out.anim.ron"])]);
+    // The first joint carries all others, so that each of these moves in every frame.
+    fs::write(folder.path().join("long.bvh"), chain_motion(3, 1_500)).unwrap();
+    for motion in ["chain.bvh", "long.bvh"] {
+        let files = ["star.rig.ron", motion];
+        check(folder.path(), &[(&files[..], &["animate", files[0], files[1], "-o", "out.anim.ron"])]);
+    }
 }
 
 #[test]
