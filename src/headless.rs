@@ -144,10 +144,7 @@ impl Workbench {
 
     /// A workbench with a loaded rig.
     pub fn with_rig(seed: u64, rig: Rig) -> Self {
-        // A rig that was made with the same seed already has its first uids.
-        let known = rig.walk().map(|joint| joint.data.uid).chain([rig.uid()]);
-        let seed = known.fold(seed, |seed, uid| seed.rotate_left(1) ^ uid.0);
-        let mut bench = Self::new(seed, "");
+        let mut bench = Self::new(UidSource::seed_beside(seed, &rig), "");
         let entity = bench.rig;
         bench.app.world_mut().entity_mut(entity).insert(rig);
         bench
@@ -207,10 +204,12 @@ impl Workbench {
 
     /// Runs one operation as one step of the history.
     pub fn operate(&mut self, operation: Operation) -> Result<(), WorkbenchError> {
-        self.forget_refusals();
-        self.app.world_mut().write_message(EditRequest::operation(self.rig, operation));
+        let request = self.app.world_mut().write_message(EditRequest::operation(self.rig, operation));
         self.app.update();
-        self.refused().map_or(Ok(()), Err)
+        // Writes to entities may be refused in the same frame.
+        let mut refusals = self.app.world_mut().resource_mut::<Messages<EditRefusal>>();
+        let refused = refusals.drain().find(|refusal| refusal.request.is_some() && refusal.request == request);
+        refused.map_or(Ok(()), |refusal| Err(refusal.reason.into()))
     }
 
     /// Carries out gestures and returns an answer for each. Where the time of [`Workbench::set_limits`] is over,

@@ -30,6 +30,7 @@ mod half;
 mod heat;
 mod held_pieces;
 mod hierarchy;
+mod holders;
 mod islands;
 mod keypoints;
 pub(crate) mod laplacian;

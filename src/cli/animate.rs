@@ -1,5 +1,6 @@
 //! `rigsmith animate`: a clip, or the motion of another skeleton, on a rig.
 
+mod animated_rig;
 mod choice;
 mod packed_clips;
 mod source;
@@ -13,6 +14,7 @@ use bevy::math::Vec3A;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
+use self::animated_rig::{AnimatedRig, running};
 use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, VrmArgs, WeightArgs, build, limits, positive,
     progress::spinning,
@@ -28,7 +30,7 @@ use crate::{
         gltf::GltfWriteSettings,
         model::{Clip, Model, Node},
     },
-    plugins::{commands::BuildStep, surface::RigMesh},
+    plugins::surface::RigMesh,
     rig::{
         BuiltRig, Rig, RigEdit, Uid,
         animation::RigClip,
@@ -38,7 +40,7 @@ use crate::{
     },
     solve::{
         bake_clip::{BakePlan, BakeSettings, BakedNode},
-        retarget::{MotionTarget, RetargetError},
+        retarget::MotionTarget,
     },
 };
 
@@ -133,12 +135,6 @@ enum PresetArg {
     Vrm,
 }
 
-impl From<RetargetError> for Failure {
-    fn from(error: RetargetError) -> Self {
-        Self::Input(Box::new(error))
-    }
-}
-
 pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
     let is_picture = args.output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png"));
     #[cfg(feature = "render")]
@@ -147,7 +143,7 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
     }
     check(args, is_picture)?;
     let mut report = Report::default();
-    let (mut rig, mut own) = read(args, &mut report)?;
+    let (mut rig, own) = read(args, &mut report)?;
     let meta = args.vrm.meta(&rig, &args.output)?;
     let is_motion = args.clips.iter().any(|clip| is_motion(clip));
     let has_commands = rig.walk().any(|joint| !joint.data.tags.is_empty());
@@ -167,38 +163,34 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
         }
         rig = bare;
     }
-    let mut bench = running(rig)?;
-    let (mut clips, map_file) = source::clips(args, onto, &mut bench, whole.as_ref(), &mut report)?;
-    switch::throw(&args.switches, &mut bench, &mut clips, &mut report)?;
+    let needs_app = is_picture || !args.switches.is_empty() || !args.meshes.is_empty() || !own.is_empty();
+    let mut animated = AnimatedRig::new(rig, needs_app)?;
+    let (mut clips, map_file) = source::clips(args, onto, &mut animated, whole.as_ref(), &mut report)?;
+    if let AnimatedRig::App(bench) = &mut animated {
+        switch::throw(&args.switches, bench, &mut clips, &mut report)?;
+    }
     describe(&clips, &mut report);
-    if is_picture {
-        picture(args, &mut bench, &clips, &mut report)?;
+    if let (true, AnimatedRig::App(bench)) = (is_picture, &mut animated) {
+        picture(args, bench, &clips, &mut report)?;
     } else if FileKind::of(&args.output) == Some(FileKind::Animation) {
-        store_animation(&RealDisk, &args.output, bench.rig(), bench.built(), &clips)?;
+        store_animation(&RealDisk, &args.output, animated.rig(), animated.built(), &clips)?;
     } else if FileKind::of(&args.output) == Some(FileKind::PackedClips) {
-        packed_clips::store(args, &bench, &clips, &mut report)?;
+        packed_clips::store(args, &animated, &clips, &mut report)?;
     } else {
-        let (mut model, settings) = match own_character(args, &bench, &mut report)? {
+        let (mut model, settings) = match own_character(args, &animated, &mut report)? {
             Some(model) => {
                 (model, GltfWriteSettings { all_joints: true, bind_unweighted: true, ..args.export.settings() })
             }
-            None => match own.len() {
-                0 => build::character_of(&mut bench, &args.meshes, &args.weights, &args.export, &mut report)?,
-                1 => {
-                    let mesh = build::MeshSource::Open(Box::new(own.swap_remove(0)));
-                    build::character_with(&mut bench, vec![mesh], &args.weights, &args.export, &mut report)?
-                }
-                _ => build::posed_meshes(&bench, &own, &args.export)?,
-            },
+            None => character(args, &mut animated, own, &mut report)?,
         };
-        let draft = meta.map(|meta| (AvatarDraft::new(bench.rig(), bench.built(), &mut model), meta));
-        model.clips = spinning("baking", || exported(args, &bench, &model, &clips, &mut report))?;
+        let draft = meta.map(|meta| (AvatarDraft::new(animated.rig(), animated.built(), &mut model), meta));
+        model.clips = spinning("baking", || exported(args, &animated, &model, &clips, &mut report))?;
         dress(args, &mut model, &mut report);
         match draft {
             Some((draft, meta)) => draft.store(model, meta, &args.output, &settings, &mut report)?,
             None => {
                 // What is written is read back, which takes as much memory again.
-                drop((bench, clips));
+                drop((animated, clips));
                 report.notes(spinning("writing", || store_owned_model(&RealDisk, &args.output, model, &settings))?);
             }
         }
@@ -213,15 +205,25 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// Workbench with a rig that is built and runs.
-fn running(rig: Rig) -> Result<Workbench, Failure> {
-    let mut bench = limits::workbench(rig);
-    if let Some(error) = bench.build(BuildStep::All).error {
-        return Err(Failure::Input(Box::new(error)));
+/// The character that clips move, and the settings for writing it.
+fn character(
+    args: &AnimateArgs,
+    animated: &mut AnimatedRig,
+    mut own: Vec<RigMesh>,
+    report: &mut Report,
+) -> Result<(Model, GltfWriteSettings), Failure> {
+    let bench = match animated {
+        AnimatedRig::Still(still) => return Ok(still.skeleton(&args.export)),
+        AnimatedRig::App(bench) => bench,
+    };
+    match own.len() {
+        0 => build::character_of(bench, &args.meshes, &args.weights, &args.export, report),
+        1 => {
+            let mesh = build::MeshSource::Open(Box::new(own.swap_remove(0)));
+            build::character_with(bench, vec![mesh], &args.weights, &args.export, report)
+        }
+        _ => build::posed_meshes(bench, &own, &args.export),
     }
-    limits::check_time("building the rig")?;
-    bench.runtime()?;
-    Ok(bench)
 }
 
 /// True if a file has the motion of a skeleton of its own.
@@ -352,13 +354,13 @@ fn track_count(clip: &RigClip) -> usize {
 
 /// Character of the rig's own file, with its mesh and weights; `None` if the rig is no model or has no mesh, or if
 /// another mesh is given.
-fn own_character(args: &AnimateArgs, bench: &Workbench, report: &mut Report) -> Result<Option<Model>, Failure> {
+fn own_character(args: &AnimateArgs, animated: &AnimatedRig, report: &mut Report) -> Result<Option<Model>, Failure> {
     if !args.meshes.is_empty() || !FileKind::of(&args.rig).is_some_and(FileKind::is_gltf) {
         return Ok(None);
     }
     let model = limits::load_model(&args.rig)?;
-    let built = bench.built().ok_or(PoseError::NotBuilt)?;
-    let skeleton = baked(bench.rig(), built);
+    let built = animated.built().ok_or(PoseError::NotBuilt)?;
+    let skeleton = baked(animated.rig(), built);
     let is_alike = skeleton.len() == model.nodes.len()
         && skeleton
             .walk()
@@ -386,14 +388,14 @@ struct AnimationFields {
 /// Clips baked for the nodes of an exported model.
 fn exported(
     args: &AnimateArgs,
-    bench: &Workbench,
+    animated: &AnimatedRig,
     model: &Model,
     clips: &[RigClip],
     report: &mut Report,
 ) -> Result<Vec<Clip>, Failure> {
-    let built = bench.built().ok_or(PoseError::NotBuilt)?;
-    let program = bench.runtime()?.state().program();
-    let nodes = baked_nodes(bench.rig(), built, model);
+    let built = animated.built().ok_or(PoseError::NotBuilt)?;
+    let program = animated.program()?;
+    let nodes = baked_nodes(animated.rig(), built, model);
     let plan = BakePlan::new(program, &nodes);
     let tolerance = tolerance(args, size_of(model.rest_globals().iter().map(|at| at.translation)));
     let mut baked = Vec::new();

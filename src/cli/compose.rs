@@ -119,9 +119,11 @@ pub(super) fn merge(args: &MergeArgs) -> Result<Report, Failure> {
     let Some(mut rig) = rigs.next() else { return Ok(report) };
     for (other, parent) in rigs.zip(parents) {
         let parent = parent.map(|label| joint(&rig, label)).transpose()?;
-        let operation = Operation::Merge { other: Arc::new(other), parent };
         limits::check_time("merging the rigs")?;
-        run(&mut rig, &operation, &mut uids, &mut report)?;
+        let merged = Operation::merge_owned(std::mem::take(&mut rig), other, parent, &mut uids);
+        let (merged, notes) = merged.map_err(|error| Failure::Input(Box::new(error)))?;
+        rig = merged;
+        report.notes(notes);
     }
     limits::check_time("merging the rigs")?;
     let joints = counted(rig.len(), "joint", "joints");

@@ -76,6 +76,9 @@ pub(super) fn run(args: &SketchArgs) -> Result<Report, Failure> {
             report.line(format!("{:>3} {:<8} {}", answer.number, answer.gesture, answer.message));
         }
     }
+    if bench.rig().is_empty() && kind.is_gltf() {
+        return Err(no_joint(&args.gestures, &answers));
+    }
     let joints = bench.rig().len();
     report.line(format!(
         "{}, {missed} without effect; {}",
@@ -91,6 +94,18 @@ pub(super) fn run(args: &SketchArgs) -> Result<Report, Failure> {
     describe_rig(&mut report, bench.rig());
     save(&mut bench, &args.output, kind, args, &mut report)?;
     Ok(report)
+}
+
+/// Failure of gestures after which there is no joint, with the reason of the first one that had no effect.
+fn no_joint(file: &Path, answers: &[GestureAnswer]) -> Failure {
+    let missed = answers.iter().find(|answer| !answer.done).map(|answer| {
+        let (number, gesture, message) = (answer.number, &answer.gesture, limits::message(&answer.message));
+        format!(" (gesture {number}, {gesture}: {message})")
+    });
+    let (file, missed) = (file.display(), missed.unwrap_or_default());
+    let text =
+        format!("`{file}`: its gestures leave no joint to which the mesh could be bound{missed}; place at least one");
+    Failure::Input(text.into())
 }
 
 fn output_kind(path: &Path) -> Result<FileKind, Failure> {

@@ -35,7 +35,8 @@ pub fn baked(rig: &Rig, built: &BuiltRig) -> Rig {
             group: node.group.filter(|group| known.contains(group)),
             kind: if node.kind == NodeType::Joint { NodeKind::Joint } else { NodeKind::Null },
             rest: node.base.into(),
-            mirror: source.and_then(|source| source.mirror),
+            // A joint that is its own partner is a fault of a rig, which nobody could mend in its skeleton.
+            mirror: source.and_then(|source| source.mirror).filter(|partner| *partner != node.uid),
             locked: source.is_some_and(|source| source.locked),
             tags: Vec::new(),
             face: None,

@@ -21,7 +21,7 @@ mod title;
 mod transform;
 mod whole_pose;
 
-use std::{collections::HashSet, sync::Arc};
+use std::{borrow::Cow, collections::HashSet, sync::Arc};
 
 use bevy::math::{Affine3, Quat, Vec3};
 
@@ -313,6 +313,21 @@ impl Operation {
         Ok((rig, notes))
     }
 
+    /// The rig with what [`Merge`](Self::Merge) puts into it, as by [`run_on`](Self::run_on). The other rig gives up its joints one
+    /// by one.
+    #[cfg(feature = "cli")]
+    pub(crate) fn merge_owned(
+        mut rig: Rig,
+        other: Rig,
+        parent: Option<Uid>,
+        uids: &mut UidSource,
+    ) -> Result<(Rig, Vec<String>), OperationError> {
+        let mut draft = Draft::without_record(&mut rig, uids);
+        merge::merge(&mut draft, Cow::Owned(other), parent)?;
+        let notes = draft.finish().notes;
+        Ok((rig, notes))
+    }
+
     fn run_in(&self, draft: &mut Draft) -> Result<(), OperationError> {
         match self {
             Self::Place { position, parent } => place::chain(draft, std::slice::from_ref(position), *parent),
@@ -373,7 +388,7 @@ impl Operation {
                 carry_nodes(draft, nodes)
             }
             Self::Tags(operation) => tags::run(draft, operation),
-            Self::Merge { other, parent } => merge::merge(draft, other, *parent),
+            Self::Merge { other, parent } => merge::merge(draft, Cow::Borrowed(other), *parent),
             Self::Edits(edits) | Self::Named { edits, .. } => {
                 edits.iter().try_for_each(|edit| Ok(draft.apply(edit.clone())?))
             }

@@ -5,6 +5,8 @@ use std::{fmt, str::FromStr};
 use bevy::prelude::*;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error as _};
 
+use super::Rig;
+
 /// A 64-bit random number that identifies a rig, group, joint or tag for good; written as 16 hexadecimal digits.
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 #[component(immutable)]
@@ -78,6 +80,12 @@ impl UidSource {
     /// A source that gives the same uids for the same seed.
     pub fn seeded(seed: u64) -> Self {
         Self { state: seed }
+    }
+
+    /// A seed that follows from another one and from a rig: a rig that was made with the same seed already has its first uids.
+    pub(crate) fn seed_beside(seed: u64, rig: &Rig) -> u64 {
+        let known = rig.walk().map(|joint| joint.data.uid).chain([rig.uid()]);
+        known.fold(seed, |seed, uid| seed.rotate_left(1) ^ uid.0)
     }
 
     /// A source that differs from run to run, for interactive work.

@@ -53,13 +53,19 @@ impl BakeSettings {
     }
 }
 
+/// Number of frames in words: one beyond all numbers of a clip is not exact.
+fn frame_count(frames: u64) -> String {
+    if frames < 1_000_000_000_000 { frames.to_string() } else { "more than a million million".to_owned() }
+}
+
 /// Reason for not baking a clip.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum BakeError {
     /// More frames than any clip has.
     #[error(
-        "the clip has {frames} frames at {rate} frames a second, and no more than {highest} are baked; shorten its range, \
-         or bake fewer frames a second",
+        "the clip has {} frames at {rate} frames a second, and no more than {highest} are baked; shorten its range, or bake \
+         fewer frames a second",
+        frame_count(*frames),
         highest = MOST_FRAMES
     )]
     TooLong {

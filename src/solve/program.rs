@@ -216,6 +216,29 @@ impl RigProgram {
         Self::compile(rig, &CompileOptions::default()).map(drop)
     }
 
+    /// Transforms of the nodes of a built rig without a pose, in the rig's space and in the order of the nodes, bit by bit as a
+    /// [`RigState`] evaluates them, and the [height](Self::rest_height) of the rig. A rig without constraints takes no memory of
+    /// a program for them.
+    ///
+    /// # Errors
+    ///
+    /// See [`ProgramError`].
+    #[cfg(feature = "cli")]
+    pub(crate) fn places_at_rest(rig: &BuiltRig) -> Result<(Vec<Trs>, f32), ProgramError> {
+        if !rig.constraints.is_empty() {
+            let mut state = RigState::new(Arc::new(Self::compile(rig, &CompileOptions::default())?));
+            state.evaluate(0.0);
+            return Ok((state.globals().to_vec(), state.program().rest_height()));
+        }
+        graph::placed_nodes(rig)?;
+        let mut places: Vec<Trs> = Vec::with_capacity(rig.nodes.len());
+        for node in &rig.nodes {
+            let above = node.parent.map_or(Trs::IDENTITY, |parent| places[parent]);
+            places.push(if node.base == Trs::IDENTITY { above } else { run::place(&above, &node.base) });
+        }
+        Ok((places, rest_height(rig.nodes.iter().map(|node| (node.parent, node.base, node.kind)))))
+    }
+
     /// Compiles a built rig whose hash is known. Expressions are read once for each constraint, and layouts worked out once
     /// for rigs that differ in numbers only.
     fn compile_hashed(
@@ -282,7 +305,7 @@ impl RigProgram {
         Ok(Self {
             serial: next_serial(),
             hash,
-            height: rest_height(&nodes),
+            height: rest_height(nodes.iter().map(|node| (node.parent, node.base, node.kind))),
             nodes,
             by_uid,
             attributes,
@@ -371,14 +394,14 @@ fn run_fixed(graph: &mut Graph<'_>, fixed: &[Op]) {
     fixed.iter().for_each(|op| machine.run(op));
 }
 
-/// See [`RigProgram::rest_height`].
-fn rest_height(nodes: &[ProgramNode]) -> f32 {
+/// See [`RigProgram::rest_height`]. Takes the parent of each node by its place in the list, its base and its kind.
+fn rest_height(nodes: impl ExactSizeIterator<Item = (Option<usize>, Trs, NodeType)>) -> f32 {
     let mut places: Vec<Affine3A> = Vec::with_capacity(nodes.len());
     let (mut low, mut high) = (Vec3A::INFINITY, Vec3A::NEG_INFINITY);
-    for node in nodes {
-        let above = node.parent.map_or(Affine3A::IDENTITY, |parent| places[parent]);
-        let place = above * node.base.affine();
-        if node.kind == NodeType::Joint {
+    for (parent, base, kind) in nodes {
+        let above = parent.map_or(Affine3A::IDENTITY, |parent| places[parent]);
+        let place = above * base.affine();
+        if kind == NodeType::Joint {
             (low, high) = (low.min(place.translation), high.max(place.translation));
         }
         places.push(place);
@@ -391,4 +414,45 @@ fn rest_height(nodes: &[ProgramNode]) -> f32 {
 fn next_serial() -> u64 {
     static NEXT: AtomicU64 = AtomicU64::new(1);
     NEXT.fetch_add(1, Ordering::Relaxed)
+}
+
+#[cfg(test)]
+#[cfg(feature = "cli")]
+mod tests {
+    use glam::{Quat, Vec3};
+
+    use super::*;
+    use crate::rig::BuiltNode;
+
+    #[test]
+    fn places_at_rest_are_those_of_a_state() {
+        let node = |number: usize| BuiltNode {
+            uid: Uid(number as u64 + 1),
+            name: Arc::from("n"),
+            kind: if number % 3 == 2 { NodeType::Null } else { NodeType::Joint },
+            parent: number.checked_sub(1 + number % 2),
+            base: match number % 4 {
+                3 => Trs::IDENTITY,
+                _ => Trs {
+                    translation: Vec3::new(0.1, 0.3 * number as f32, -0.2),
+                    rotation: Quat::from_xyzw(0.6, 0.0, 0.8, 0.0),
+                    scale: Vec3::new(1.0, 2.0, 0.5),
+                },
+            },
+            label: None,
+            group: None,
+            origin: None,
+            control: None,
+            layer: None,
+            attributes: Arc::from([]),
+        };
+        let rig = BuiltRig { nodes: (0..9).map(node).collect(), ..BuiltRig::default() };
+        let (places, height) = RigProgram::places_at_rest(&rig).unwrap();
+        let mut state = RigState::new(Arc::new(RigProgram::compile(&rig, &CompileOptions::default()).unwrap()));
+        state.evaluate(0.0);
+        assert_eq!(places, state.globals());
+        assert_eq!(height, state.program().rest_height());
+        let doubled = BuiltRig { nodes: [0, 0].map(node).into(), ..BuiltRig::default() };
+        assert!(RigProgram::places_at_rest(&doubled).is_err());
+    }
 }

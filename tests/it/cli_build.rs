@@ -452,6 +452,18 @@ fn modules_are_listed_with_parameters_and_defaults() {
     assert!(wrong.err.contains("sprign") && wrong.err.contains("spring"), "{}", wrong.err);
 }
 
+/// `check` takes what `build` writes.
+#[test]
+fn a_joint_that_is_its_own_partner_has_none_in_the_skeleton() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("t.rig.ron"), "(format: 2, name: \"t\", joints: [(label: \"a\", mirror: \"a\")])")
+        .unwrap();
+    assert_eq!(rigsmith(folder.path(), &["check", "t.rig.ron"]).code, 1);
+    assert_eq!(rigsmith(folder.path(), &["build", "t.rig.ron", "-o", "built.rig.ron"]).code, 0);
+    let checked = rigsmith(folder.path(), &["check", "built.rig.ron"]);
+    assert_eq!(checked.code, 0, "{}{}", checked.out, checked.err);
+}
+
 #[test]
 fn the_command_builds_what_an_app_builds() {
     let folder = tempfile::tempdir().unwrap();

@@ -7,6 +7,14 @@ use super::bone::BoneSegment;
 /// Bones in a leaf of the tree.
 const LEAF: usize = 4;
 
+/// Number of bones from which on long ones are cut into pieces, most pieces of a bone, and most of all bones.
+const MANY: usize = 64;
+const PIECES: usize = 8;
+const ALL_PIECES: usize = 1 << 16;
+
+/// Margin around the boxes of pieces, as a share of the largest coordinate: more than their ends are off by rounding.
+const MARGIN: f32 = 1e-6;
+
 /// A bounding volume hierarchy over bones.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct BoneTree {
@@ -26,9 +34,23 @@ struct Node {
 }
 
 impl BoneTree {
-    /// Builds the tree by median splits. O(n log n) for n bones.
+    /// Builds the tree by median splits. O(n log n) for n bones. Of many bones, long ones lie in the tree piece by piece: boxes
+    /// around bones that cross the whole body, as those of a star, all overlap.
     pub fn new(bones: &[BoneSegment]) -> Self {
-        Self::build(bones, false)
+        let (pieces, owners) = pieces(bones);
+        if pieces.len() == bones.len() {
+            return Self::build(bones, false);
+        }
+        let mut tree = Self::build(&pieces, false);
+        for place in &mut tree.order {
+            *place = owners[*place as usize];
+        }
+        let ends = bones.iter().flat_map(|bone| [bone.head, bone.tail]);
+        let margin = Vec3::splat(MARGIN * ends.fold(0.0, |most, end| end.abs().max_element().max(most)));
+        for node in &mut tree.nodes {
+            (node.low, node.high) = (node.low - margin, node.high + margin);
+        }
+        tree
     }
 
     /// Tree over boxes, of which each "bone" is a diagonal. Flat boxes over each other are split across, however they lie.
@@ -78,7 +100,20 @@ impl BoneTree {
     /// overwritten.
     ///
     /// `cost` of a bone must not be less than its distance; infinity leaves a bone out.
-    pub fn nearest(&self, point: Vec3, band: f32, mut cost: impl FnMut(u32) -> f32, out: &mut Vec<(f32, u32)>) {
+    pub fn nearest(&self, point: Vec3, band: f32, cost: impl FnMut(u32) -> f32, out: &mut Vec<(f32, u32)>) {
+        self.cheapest(point, band, cost, |distance| distance, out);
+    }
+
+    /// The bones as [`nearest`](Self::nearest) finds them, where `least` says the least cost of a bone at a distance, which does
+    /// not fall with the distance.
+    pub fn cheapest(
+        &self,
+        point: Vec3,
+        band: f32,
+        mut cost: impl FnMut(u32) -> f32,
+        least: impl Fn(f32) -> f32,
+        out: &mut Vec<(f32, u32)>,
+    ) {
         out.clear();
         let mut best = f32::INFINITY;
         // Median splits of at most 2^32 bones are never deeper.
@@ -88,7 +123,7 @@ impl BoneTree {
             waiting -= 1;
             let index = stack[waiting];
             let node = &self.nodes[index as usize];
-            if distance_to_box(point, node) > best * (1.0 + band) {
+            if least(distance_to_box(point, node)) > best * (1.0 + band) {
                 continue;
             }
             if node.count > 0 {
@@ -109,9 +144,16 @@ impl BoneTree {
             stack[waiting + 1] = near;
             waiting += 2;
         }
-        out.retain(|e| e.0 <= best * (1.0 + band));
-        out.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        keep_cheapest(out, best, band);
     }
+}
+
+/// Leaves what costs at most `1 + band` times the least, cheapest first, and each bone once.
+pub(super) fn keep_cheapest(list: &mut Vec<(f32, u32)>, best: f32, band: f32) {
+    list.retain(|e| e.0 <= best * (1.0 + band));
+    list.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    // Pieces of a bone are next to each other, because they have its cost.
+    list.dedup_by_key(|e| e.1);
 }
 
 impl BoneTree {
@@ -138,6 +180,31 @@ impl BoneTree {
         }
         false
     }
+}
+
+/// Pieces of bones, with the bone of each: bones that are longer than the spacing of as many bones in the space around them are
+/// cut to it.
+fn pieces(bones: &[BoneSegment]) -> (Vec<BoneSegment>, Vec<u32>) {
+    let most = (ALL_PIECES / bones.len().max(1)).min(PIECES);
+    if bones.len() < MANY || most < 2 {
+        return (bones.to_vec(), Vec::new());
+    }
+    let ends = || bones.iter().flat_map(|bone| [bone.head, bone.tail]);
+    let extent = ends().fold(Vec3::NEG_INFINITY, Vec3::max) - ends().fold(Vec3::INFINITY, Vec3::min);
+    let side = (1..).find(|side: &usize| side.pow(3) >= bones.len()).unwrap_or(1);
+    let longest = extent.max_element() / side as f32;
+    let (mut list, mut owners) = (Vec::with_capacity(bones.len()), Vec::with_capacity(bones.len()));
+    for (number, bone) in bones.iter().enumerate() {
+        let along = bone.tail - bone.head;
+        let count = ((along.length() / longest).ceil() as usize).clamp(1, most);
+        let place = |piece: usize| bone.head + along * (piece as f32 / count as f32);
+        for piece in 0..count {
+            let tail = if piece + 1 == count { bone.tail } else { place(piece + 1) };
+            list.push(BoneSegment { joint: bone.joint, head: place(piece), tail });
+            owners.push(number as u32);
+        }
+    }
+    (list, owners)
 }
 
 fn distance_to_box(point: Vec3, node: &Node) -> f32 {

@@ -10,8 +10,9 @@ use rayon::prelude::*;
 use super::{
     WeightJoint,
     bone::BoneSegment,
-    bone_tree::{BoneTree, closest_on},
+    bone_tree::closest_on,
     folds::{Fold, folds},
+    holders::Holders,
     keypoints,
     roots::{Homes, MANY_CHILDREN, Roots, parents_first},
     sight::Sight,
@@ -34,9 +35,11 @@ pub(crate) struct Bones {
     pub segments: Vec<BoneSegment>,
     /// Usual reach of the flesh around each bone.
     pub girths: Vec<f32>,
+    /// The largest of them.
+    pub largest_girth: f32,
     /// Folds at which each bone may lose skin to another.
     pub folds: Vec<Vec<Fold>>,
-    pub tree: BoneTree,
+    pub holders: Holders,
     homes: Homes,
 }
 
@@ -45,6 +48,11 @@ impl Bones {
     /// bone runs through, as hats and capes, belong to the bones of the part that they lie on.
     pub fn may_hold(&self, bone: u32, island: usize) -> bool {
         self.homes.may_hold(bone, self.segments[bone as usize].joint, island)
+    }
+
+    /// The joints that alone may hold an island; `None` if all may.
+    pub fn joints_of(&self, island: usize) -> Option<&[u32]> {
+        self.homes.joints_of(island)
     }
 
     /// Bones without those of slots, for islands that are bound without regard to body parts.
@@ -125,12 +133,13 @@ pub(crate) fn build(
     drop_repeats(&mut segments, &mut leaves, claims);
     let homes = Homes::new(joints, (claims, slots), &segments, points, sight);
     grow_leaves(joints, &mut segments, &leaves, points, areas, (sight, &homes));
-    let tree = BoneTree::new(&segments);
-    let girths = girths(&segments, &tree, points, areas, (sight, &homes));
+    let holders = Holders::new(&segments);
+    let girths = girths(&segments, &holders, points, areas, (sight, &homes));
     let mut is_guess = vec![false; segments.len()];
     leaves.iter().for_each(|(segment, _)| is_guess[*segment] = true);
     let folds = folds(&segments, &is_guess);
-    Bones { segments, girths, folds, tree, homes }
+    let largest_girth = girths.iter().copied().fold(0.0, f32::max);
+    Bones { segments, girths, largest_girth, folds, holders, homes }
 }
 
 /// True if the bone to `joint` turns back along the bone by which the chain arrived at its parent: an ear that hangs on
@@ -252,13 +261,13 @@ fn grow_leaves(
     for (leaf, &(segment, _)) in leaves.iter().enumerate() {
         leaf_of[segment] = leaf;
     }
-    let tree = BoneTree::new(segments);
+    let holders = Holders::new(segments);
     let nearest: Vec<usize> = points
         .par_chunks(CHUNK)
         .enumerate()
         .flat_map_iter(|(number, chunk)| {
             let mut near = Vec::new();
-            let (segments, leaf_of, tree) = (&*segments, &leaf_of, &tree);
+            let (segments, leaf_of, holders) = (&*segments, &leaf_of, &holders);
             chunk.iter().enumerate().map(move |(at, &point)| {
                 let index = number * CHUNK + at;
                 // Beyond the last joint its place and the end of its parent's bone are equally near.
@@ -268,7 +277,7 @@ fn grow_leaves(
                     let may_hold = homes.may_hold(b, segment.joint, island);
                     if may_hold { closest_on(segment, point).distance(point) } else { f32::INFINITY }
                 };
-                tree.nearest(point, 1e-4, cost, &mut near);
+                holders.cheapest((point, 1e-4), homes.joints_of(island), cost, |distance| distance, &mut near);
                 let leaf = near.iter().map(|e| leaf_of[e.1 as usize]).find(|&l| l != usize::MAX);
                 leaf.filter(|&l| sight.clear(index, point, joints[leaves[l].1].head)).unwrap_or(usize::MAX)
             })
@@ -318,7 +327,7 @@ fn incoming_direction(joints: &[WeightJoint], joint: usize) -> Option<Vec3> {
 /// as for the bone of a hat.
 fn girths(
     segments: &[BoneSegment],
-    tree: &BoneTree,
+    holders: &Holders,
     points: &[Vec3],
     areas: &[f32],
     (sight, homes): (&Sight, &Homes),
@@ -336,7 +345,7 @@ fn girths(
                     let may_hold = homes.may_hold(b, segment.joint, island);
                     if may_hold { closest_on(segment, point).distance(point) } else { f32::INFINITY }
                 };
-                tree.nearest(point, 0.0, cost, &mut near);
+                holders.cheapest((point, 0.0), homes.joints_of(island), cost, |distance| distance, &mut near);
                 let &(distance, bone) = near.first().filter(|nearest| nearest.0.is_finite())?;
                 sight.clear(p, point, closest_on(&segments[bone as usize], point)).then_some((bone, distance))
             })

@@ -186,7 +186,8 @@ fn claim(index: usize, skin: Skin, bones: &Bones, sight: &Sight, near: &mut Vec<
     let (point, island) = (skin.point, sight.island(index));
     let may_hold = |bone: u32| bones.may_hold(bone, island);
     let cost = |bone: u32| if may_hold(bone) { skin.reach(bones, bone).0 } else { f32::INFINITY };
-    bones.tree.nearest(point, BAND, cost, near);
+    let least = |distance: f32| reach(distance, bones.largest_girth);
+    bones.holders.cheapest((point, BAND), bones.joints_of(island), cost, least, near);
     skin.share_folds(bones, may_hold, near);
     let Some(&(best, first)) = near.first() else { return result };
     let target = closest_on(&bones.segments[first as usize], point);

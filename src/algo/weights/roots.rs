@@ -236,6 +236,11 @@ impl Homes {
         self.is_at_home(joint, island) && self.links.binary_search(&(self.bearer(island), bone)).is_err()
     }
 
+    /// The joints that alone may hold an island; `None` if all may.
+    pub fn joints_of(&self, island: usize) -> Option<&[u32]> {
+        self.parts.get(self.bearer(island))?.as_deref()
+    }
+
     /// True if an island lies on others, as a hat or a buckle does: it is no flesh about a bone.
     pub fn lies_on_others(&self, island: usize) -> bool {
         self.lying.get(island) == Some(&true)

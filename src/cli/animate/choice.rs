@@ -16,7 +16,7 @@ use crate::{
         },
         nearest::did_you_mean,
     },
-    solve::bake_clip::BakeError,
+    solve::{bake_clip::BakeError, retarget::RetargetError},
 };
 
 /// Error of taking the clips of the files.
@@ -43,6 +43,14 @@ pub(super) enum ClipFileError {
         path: PathBuf,
         /// Reason.
         source: JointMapError,
+    },
+    /// The motion of a file cannot be put onto the rig.
+    #[error("`{}`: {source}", path.display())]
+    Retarget {
+        /// The file.
+        path: PathBuf,
+        /// Reason.
+        source: RetargetError,
     },
     /// The map names a joint that no file has.
     #[error("the map of --map: none of the files of motion has a joint \"{name}\"{nearest}")]

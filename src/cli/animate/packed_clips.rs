@@ -2,11 +2,11 @@
 
 use serde_json::json;
 
-use super::{AnimateArgs, bake_settings, reduction, size_of, tolerance};
+use super::{AnimateArgs, animated_rig::AnimatedRig, bake_settings, reduction, size_of, tolerance};
 use crate::{
     cli::{Failure, Report, limits, progress::spinning, report::counted},
     files::{RealDisk, store_packed_clips},
-    headless::{Workbench, posing::PoseError},
+    headless::posing::PoseError,
     rig::{Rig, animation::RigClip, bake::baked},
     solve::packed_clip::{PackedSkeleton, pack_clip},
 };
@@ -14,15 +14,15 @@ use crate::{
 /// Packs clips for the joints of the built rig, and saves them.
 pub(super) fn store(
     args: &AnimateArgs,
-    bench: &Workbench,
+    animated: &AnimatedRig,
     clips: &[RigClip],
     report: &mut Report,
 ) -> Result<(), Failure> {
-    let built = bench.built().ok_or(PoseError::NotBuilt)?;
-    let program = bench.runtime()?.state().program();
-    let mut packed = PackedSkeleton::of(bench.rig(), built);
+    let built = animated.built().ok_or(PoseError::NotBuilt)?;
+    let program = animated.program()?;
+    let mut packed = PackedSkeleton::of(animated.rig(), built);
     let nodes = packed.baked_nodes();
-    let tolerance = tolerance(args, height_of(&baked(bench.rig(), built)));
+    let tolerance = tolerance(args, height_of(&baked(animated.rig(), built)));
     let mut facts = Vec::new();
     let mut sums = [0, 0];
     for clip in clips {

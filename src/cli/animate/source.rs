@@ -5,7 +5,9 @@ use std::{collections::HashMap, path::Path, sync::Arc};
 use serde_json::{Map, Value, json};
 
 use super::{
-    AnimateArgs, bake_settings,
+    AnimateArgs,
+    animated_rig::AnimatedRig,
+    bake_settings,
     choice::{Choice, ClipFileError, GivenMap, check_rate},
     size_of, tolerance,
 };
@@ -15,7 +17,7 @@ use crate::{
     headless::{Workbench, posing::PoseError},
     mesh::model::Model,
     rig::{
-        Rig, Uid, UidSource,
+        Rig, Uid,
         animation::{
             RigClip,
             file_clip::{motion_of, numbered_clip, own_joints, rig_clip},
@@ -24,7 +26,7 @@ use crate::{
             motion::Motion,
         },
         format::animation::BoundClips,
-        operations::{ClipOperation, KeyTolerance, Operation},
+        operations::KeyTolerance,
     },
     solve::{
         bake_clip::{BakedNode, bake_clip},
@@ -37,11 +39,11 @@ use crate::{
 type ClipsWithMap = (Vec<RigClip>, Option<StagedFile<'static>>);
 
 /// Clips of all files, added to the rig as one would add them in the window. `whole` is the rig with its commands where the
-/// bench has its joints alone: clips of its controls are baked onto the joints.
+/// animated one has its joints alone: clips of its controls are baked onto the joints.
 pub(super) fn clips(
     args: &AnimateArgs,
     onto: MotionTarget,
-    bench: &mut Workbench,
+    animated: &mut AnimatedRig,
     whole: Option<&Workbench>,
     report: &mut Report,
 ) -> Result<ClipsWithMap, Failure> {
@@ -62,21 +64,21 @@ pub(super) fn clips(
         match FileKind::of(path) {
             Some(kind) if kind.is_gltf() => {
                 let model = spinning("reading the animations", || limits::load_model(path))?;
-                taking.add_model(path, &model, bench, report)?;
+                taking.add_model(path, &model, animated, report)?;
             }
             Some(FileKind::PackedClips) => {
                 let model = spinning("unpacking the clips", || limits::load_packed_clips(path))?;
-                taking.add_model(path, &model, bench, report)?;
+                taking.add_model(path, &model, animated, report)?;
             }
             Some(FileKind::Bvh) => {
                 let motion = spinning("reading the motion", || load_motion(&RealDisk, path))?;
                 if taking.choice.takes(&motion.name)
-                    && let Err(error) = taking.add_motion(path, &motion, bench, report)
+                    && let Err(error) = taking.add_motion(path, &motion, animated, report)
                 {
                     failed = failed.or(Some(error));
                 }
             }
-            _ => taking.add_clips(path, bench, whole, report)?,
+            _ => taking.add_clips(path, animated, whole, report)?,
         }
     }
     // A misspelt name in the map is why a motion has no joint of the rig.
@@ -119,7 +121,7 @@ impl ClipCollector<'_> {
     fn add_clips(
         &mut self,
         path: &Path,
-        bench: &mut Workbench,
+        animated: &mut AnimatedRig,
         whole: Option<&Workbench>,
         report: &mut Report,
     ) -> Result<(), Failure> {
@@ -127,7 +129,7 @@ impl ClipCollector<'_> {
         report.notes(read.notes.iter().cloned());
         let bound = match whole {
             Some(whole) => read.onto(whole.rig(), whole.built()),
-            None => read.onto(bench.rig(), bench.built()),
+            None => read.onto(animated.rig(), animated.built()),
         };
         drop(read);
         self.tell_missing(path, &bound, report);
@@ -142,7 +144,7 @@ impl ClipCollector<'_> {
             }
             check_rate(self.args, &clip.name, clip.duration())?;
             if let Some(whole) = whole {
-                let Some(baked) = on_joints(self.args, &clip, bench.rig(), whole)? else {
+                let Some(baked) = on_joints(self.args, &clip, animated.rig(), whole)? else {
                     report.notes.push(format!("the clip \"{}\" moves no joint", clip.name));
                     continue;
                 };
@@ -157,7 +159,7 @@ impl ClipCollector<'_> {
             clip.frame_rate = self.args.fps.unwrap_or(clip.frame_rate);
             taken.push(clip);
         }
-        self.added.extend(add_all(bench, taken)?);
+        self.added.extend(animated.add_all(taken)?);
         Ok(())
     }
 
@@ -223,25 +225,6 @@ fn on_joints(args: &AnimateArgs, clip: &RigClip, rig: &Rig, whole: &Workbench) -
     Ok(rig_clip(rig, &clip.name, &baked, &joints))
 }
 
-/// Adds the clips of a file to the document; returns them as the document has them. Nobody takes them back: a step of the history
-/// and its request would hold them twice more.
-fn add_all(bench: &mut Workbench, clips: Vec<RigClip>) -> Result<Vec<RigClip>, Failure> {
-    let before = bench.rig().clips().len();
-    if !clips.is_empty() {
-        let operation = Operation::Clips(ClipOperation::AddAll(clips));
-        let (entity, app) = (bench.rig_entity(), bench.app_mut());
-        let world = app.world_mut();
-        let rig = world.get_mut::<Rig>(entity).map(|mut rig| std::mem::take(&mut *rig)).unwrap_or_default();
-        let changed = operation.run_on(rig, &mut world.resource_mut::<UidSource>());
-        let (rig, _) = changed.map_err(|error| Failure::Input(Box::new(error)))?;
-        if let Some(mut document) = world.get_mut::<Rig>(entity) {
-            *document = rig;
-        }
-        app.update();
-    }
-    Ok(bench.rig().clips()[before..].to_vec())
-}
-
 /// Motion of models and of motion capture.
 impl ClipCollector<'_> {
     /// Adds the chosen animations of a model: key by key where the model's joints are those of the rig, else retargeted.
@@ -249,12 +232,12 @@ impl ClipCollector<'_> {
         &mut self,
         path: &Path,
         model: &Model,
-        bench: &mut Workbench,
+        animated: &mut AnimatedRig,
         report: &mut Report,
     ) -> Result<(), Failure> {
         let args = self.args;
         let has_keys = self.onto == MotionTarget::Joints && args.map.is_none() && args.map_out.is_none();
-        let own = has_keys.then(|| own_joints(model, bench.rig())).flatten();
+        let own = has_keys.then(|| own_joints(model, animated.rig())).flatten();
         let before = self.added.len();
         let mut taken = Vec::new();
         let mut is_any_left_out = false;
@@ -269,11 +252,11 @@ impl ClipCollector<'_> {
                 if motion.frames() == 0 {
                     report.notes.push(format!("the clip \"{name}\" moves no joint"));
                 } else {
-                    self.add_motion(path, &motion, bench, report)?;
+                    self.add_motion(path, &motion, animated, report)?;
                 }
                 continue;
             };
-            let Some(mut clip) = numbered_clip(bench.rig(), model, number, joints) else {
+            let Some(mut clip) = numbered_clip(animated.rig(), model, number, joints) else {
                 report.notes.push(format!("the clip \"{name}\" moves no joint"));
                 continue;
             };
@@ -283,7 +266,7 @@ impl ClipCollector<'_> {
             clip.frame_rate = args.fps.unwrap_or(clip.frame_rate);
             taken.push(clip);
         }
-        for clip in add_all(bench, taken)? {
+        for clip in animated.add_all(taken)? {
             let keys = clip.key_count();
             report.line(format!("\"{}\" has its keys on the joints of the rig", clip.name));
             self.told.push(Map::from_iter([
@@ -310,17 +293,17 @@ impl ClipCollector<'_> {
         &mut self,
         path: &Path,
         motion: &Motion,
-        bench: &mut Workbench,
+        animated: &mut AnimatedRig,
         report: &mut Report,
     ) -> Result<(), Failure> {
         let (args, onto) = (self.args, self.onto);
         report.notes(motion.notes.iter().cloned());
         check_rate(args, &motion.name, motion.duration())?;
-        let map = self.maps.of(args, path, motion, bench.rig(), report)?;
-        let mut entry = describe_map(&map, motion, bench.rig(), report);
+        let map = self.maps.of(args, path, motion, animated.rig(), report)?;
+        let mut entry = describe_map(&map, motion, animated.rig(), report);
         // All clips of a model have one skeleton, and so one map.
         if let Some(path) = args.map_out.as_ref().filter(|_| self.told.is_empty()) {
-            let text = write_joint_map(&map.names(motion, bench.rig()));
+            let text = write_joint_map(&map.names(motion, animated.rig()));
             self.map_file = Some(stage_file(&RealDisk, path, text.as_bytes())?);
         }
         // Keys of joints go into such files as they are.
@@ -337,8 +320,9 @@ impl ClipCollector<'_> {
             curves: if is_written { CurveKind::Linear } else { CurveKind::Fewest },
             ..RetargetSettings::default()
         };
-        let built = bench.built().ok_or(PoseError::NotBuilt)?;
-        let done = spinning("retargeting", || retarget(bench.rig(), built, motion, &map, &settings))?;
+        let built = animated.built().ok_or(PoseError::NotBuilt)?;
+        let done = spinning("retargeting", || retarget(animated.rig(), built, motion, &map, &settings))
+            .map_err(|source| ClipFileError::Retarget { path: path.to_owned(), source })?;
         let RetargetedMotion { clip, keys, stances, touches, unmoved, root, notes } = done;
         report.notes(notes);
         if let Some(root) = root {
@@ -357,10 +341,10 @@ impl ClipCollector<'_> {
                 .notes
                 .push(format!("no control turns {}: they keep their places at the joints above", unmoved.join(", ")));
         }
-        let clip = add_all(bench, vec![clip.clone()])?.pop().unwrap_or(clip);
-        let program = Arc::clone(bench.runtime()?.state().program());
-        let feet = measure_feet(bench.rig(), &program, &clip, &map.target, &stances);
-        let hands = measure_hands(bench.rig(), &program, &clip, &map.target, &touches);
+        let clip = animated.add_all(vec![clip.clone()])?.pop().unwrap_or(clip);
+        let program = Arc::clone(animated.program()?);
+        let feet = measure_feet(animated.rig(), &program, &clip, &map.target, &stances);
+        let hands = measure_hands(animated.rig(), &program, &clip, &map.target, &touches);
         let reduction = keys[0] as f32 / keys[1].max(1) as f32;
         report.line(format!(
             "{} instead of {} ({reduction:.1} : 1); feet stand {}, slide {:.2} % and are off the ground by {:.2} % of the height at most",
@@ -418,32 +402,4 @@ fn describe_map(map: &JointMap, motion: &Motion, rig: &Rig, report: &mut Report)
         ("unmapped_source".to_owned(), from.into()),
         ("unmapped_target".to_owned(), to.into()),
     ])
-}
-
-#[cfg(test)]
-mod tests {
-    use bevy::{diagnostic::FrameCount, prelude::Messages};
-
-    use super::*;
-    use crate::plugins::{document::EditRequest, history::RigHistory};
-
-    #[test]
-    fn clips_of_a_file_take_one_frame_of_the_app() {
-        let mut bench = limits::empty_workbench("n");
-        let frames = |bench: &mut Workbench| bench.app_mut().world().resource::<FrameCount>().0;
-        let clip = |number: u64| {
-            let text = number.to_string();
-            let uid = |kind: &str| Uid::derived([kind, text.as_str()]);
-            RigClip::new(uid("clip"), uid("layer"), "walk")
-        };
-        let before = frames(&mut bench);
-        let Ok(added) = add_all(&mut bench, (0..300).map(clip).collect()) else { panic!("no clip is refused") };
-        assert_eq!(frames(&mut bench) - before, 1);
-        assert_eq!((added.len(), added[299].name.as_str()), (300, "walk 300"));
-        // Nothing holds them beside the document.
-        let rig = bench.rig_entity();
-        let world = bench.app_mut().world();
-        assert!(world.resource::<Messages<EditRequest>>().is_empty());
-        assert!(world.get::<RigHistory>(rig).is_some_and(|history| history.steps().0.is_empty()));
-    }
 }

@@ -25,6 +25,13 @@ pub(super) struct SwitchOverArgs {
     range: Option<[f32; 2]>,
 }
 
+impl SwitchOverArgs {
+    /// True if no switch is thrown.
+    pub fn is_empty(&self) -> bool {
+        self.switches.is_empty()
+    }
+}
+
 /// Error of a range of frames.
 #[derive(Debug, thiserror::Error)]
 enum RangeError {

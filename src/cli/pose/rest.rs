@@ -18,7 +18,7 @@ use crate::{
     plugins::{commands::NamedProgramError, runtime::is_same_place, surface::RigMesh},
     processor::{Builder, Modules},
     rig::{BuiltRig, Rig},
-    solve::program::{CompileOptions, RigProgram, RigState},
+    solve::program::RigProgram,
 };
 
 /// True if the command writes no values and binds no meshes, and the rig has neither commands nor a pose: whatever frames
@@ -78,13 +78,11 @@ pub(super) fn pose(args: &PoseArgs, rig: Rig, report: &mut Report) -> Result<(),
 
 /// Tells the nodes of a built rig, as entities show them and as the program computes them.
 fn tell(rig: &Rig, built: &BuiltRig, report: &mut Report) -> Result<(), PoseError> {
-    let program = RigProgram::compile(built, &CompileOptions::default())
-        .map_err(|error| PoseError::CannotRun(NamedProgramError::new(error, rig)))?;
-    let mut state = RigState::new(Arc::new(program));
-    state.evaluate(0.0);
+    let (places, height) =
+        RigProgram::places_at_rest(built).map_err(|error| PoseError::CannotRun(NamedProgramError::new(error, rig)))?;
     let mut shown: Vec<GlobalTransform> = Vec::with_capacity(built.nodes.len());
-    for node in &built.nodes {
-        if state.global(node.uid).is_some_and(|global| !global.translation.is_finite()) {
+    for (node, place) in built.nodes.iter().zip(&places) {
+        if !place.translation.is_finite() {
             return Err(PoseError::NotFinite { node: node.name.to_string() });
         }
         let above = node.parent.map_or(GlobalTransform::IDENTITY, |parent| shown[parent]);
@@ -95,20 +93,18 @@ fn tell(rig: &Rig, built: &BuiltRig, report: &mut Report) -> Result<(), PoseErro
             scale: base.scale,
         }));
     }
-    let height = state.program().rest_height();
-    let posed = built.nodes.iter().zip(&shown).filter_map(|(node, shown)| {
-        let place = state.global(node.uid)?;
+    let posed = built.nodes.iter().zip(&shown).zip(&places).map(|((node, shown), place)| {
         // Below an unevenly scaled joint matrices shear, which an app corrects.
         let (now, wanted) = (shown.affine(), place.affine());
         let shown = if is_same_place(&now, &wanted, height) { now } else { wanted };
         let (translation, rotation, scale) = (place.translation, place.rotation, place.scale);
-        Some(PosedNode {
+        PosedNode {
             node: node.clone(),
             parent: node.parent.map(|parent| built.nodes[parent].uid),
             // The rig is where the world is.
             entity: GlobalTransform::from(Affine3A::IDENTITY * shown).compute_transform(),
             program: Transform { translation, rotation, scale },
-        })
+        }
     });
     tell_nodes(report, posed);
     Ok(())

@@ -130,6 +130,37 @@ impl Player {
         played.into_iter().flatten().collect()
     }
 
+    /// Number of places that a function of [`each`](Self::each) gets.
+    pub fn width(&self) -> usize {
+        self.modes.len() * self.joints.len()
+    }
+
+    /// Results of a function of the joints' places with either of two values of the tracks, one for each of so many frames. No
+    /// places are held over the frames.
+    pub fn each_pair<T: Send>(
+        &self,
+        frames: usize,
+        values: [&(dyn Fn(usize, usize) -> [f32; 4] + Sync); 2],
+        tracks: usize,
+        of: impl Fn([Vec<JointPlace>; 2]) -> T + Sync,
+    ) -> Vec<T> {
+        let blocks: Vec<usize> = (0..frames).step_by(BLOCK).collect();
+        let played: Vec<Vec<T>> = blocks
+            .into_par_iter()
+            .map(|start| {
+                let mut states = [(); 2].map(|()| RigState::new(self.program.clone()));
+                let at = |frame: usize| {
+                    of([0, 1].map(|side: usize| {
+                        let values: Vec<[f32; 4]> = (0..tracks).map(|track| values[side](track, frame)).collect();
+                        self.places(&mut states[side], &values)
+                    }))
+                };
+                (start..(start + BLOCK).min(frames)).map(at).collect()
+            })
+            .collect();
+        played.into_iter().flatten().collect()
+    }
+
     /// Reach of each track: tried at some frames, in all directions. `length` is a small distance on the figure.
     pub fn reaches(&self, tracks: &[SampledTrack], length: f32) -> Vec<TrackReach> {
         let count = tracks.first().map_or(0, |track| track.values.len());
@@ -212,7 +243,12 @@ mod tests {
             1,
             |_, places| places,
         );
-        assert_eq!((places[0].len(), places[1].len()), (2, 2));
+        assert_eq!((places[0].len(), places[1].len(), player.width()), (2, 2, 2));
+        let turn = |_: usize, frame: usize| if frame == 0 { [0.0, 0.0, 0.0, 1.0] } else { turned.to_array() };
+        let still = |_: usize, _: usize| [0.0, 0.0, 0.0, 1.0];
+        let pairs = player.each_pair(2, [&turn, &still], 1, |pair| pair);
+        let wanted = [places[0].clone(), places[1].clone()].map(|moved| [moved, places[0].clone()]);
+        assert_eq!(pairs, wanted);
         assert!(places[0][1].0.distance(places[1][1].0) > 0.4, "{places:?}");
     }
 }

@@ -15,6 +15,10 @@ use crate::{
     },
 };
 
+/// Most places of joints, of all frames together, that are held while keys are reduced, in 32 bytes each. The motion of more is
+/// played again for each comparison.
+const MOST_HELD: usize = 1 << 18;
+
 /// Offsets of nodes frame by frame, attributes that are constant, and attributes frame by frame.
 #[derive(Debug, Clone, Default)]
 pub(super) struct KeyedTracks {
@@ -58,10 +62,12 @@ pub(super) fn fill(
         track.tolerance = track_tolerance(&track.property, reach.most, &of);
     }
     let count = tracks.len();
-    let truth = player.each(times.len(), |track, frame| tracks[track].values[frame], count, |_, places| places);
+    let captured = |track: usize, frame: usize| tracks[track].values[frame];
+    let is_held = times.len().saturating_mul(player.width()) <= MOST_HELD;
+    let truth = if is_held { player.each(times.len(), captured, count, |_, places| places) } else { Vec::new() };
     let keys = reduce_tracks(times, &tracks, curves, |values| {
-        let errors = |frame: usize, places: Vec<JointPlace>| {
-            let errors = errors_of(&places, &truth[frame], tolerance);
+        let errors = |places: &[JointPlace], wanted: &[JointPlace]| {
+            let errors = errors_of(places, wanted, tolerance);
             let of_places = |reach: &TrackReach| {
                 let own = reach.places.iter().filter_map(|place| errors.get(*place));
                 own.copied().fold(0.0, f32::max)
@@ -71,7 +77,13 @@ pub(super) fn fill(
                 of_tracks: reaches.iter().map(of_places).collect(),
             }
         };
-        player.each(times.len(), |track, frame| values[track][frame], count, errors)
+        let reduced = |track: usize, frame: usize| values[track][frame];
+        match is_held {
+            true => player.each(times.len(), reduced, count, |frame, places| errors(&places, &truth[frame])),
+            false => {
+                player.each_pair(times.len(), [&reduced, &captured], count, |[places, wanted]| errors(&places, &wanted))
+            }
+        }
     });
     for (target, keys) in targets.into_iter().zip(keys) {
         counts[0] += times.len();

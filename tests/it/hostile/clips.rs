@@ -76,8 +76,12 @@ fn motion_of_few_joints_on_a_rig_of_many_stays_within_its_memory() {
     let rig = format!("(format: 2, name: \"star\", joints: [(label: \"j0\"), {}])", joints.join(", "));
     fs::write(folder.path().join("star.rig.ron"), rig).unwrap();
     fs::write(folder.path().join("chain.bvh"), chain_motion(100, 300)).unwrap();
-    let files = ["star.rig.ron", "chain.bvh"];
-    check(folder.path(), &[(&files[..], &["animate", files[0], files[1], "-o", "out.anim.ron"])]);
+    // The first joint carries all others, so that each of these moves in every frame.
+    fs::write(folder.path().join("long.bvh"), chain_motion(3, 1_500)).unwrap();
+    for motion in ["chain.bvh", "long.bvh"] {
+        let files = ["star.rig.ron", motion];
+        check(folder.path(), &[(&files[..], &["animate", files[0], files[1], "-o", "out.anim.ron"])]);
+    }
 }
 
 #[test]
@@ -157,6 +161,31 @@ fn transforms_and_markers_beyond_their_limits_are_told() {
             assert!(wanted.iter().all(|part| told.contains(part)), "{args:?}: {told}");
             assert!(!folder.path().join(output).exists(), "{args:?}");
         }
+    }
+}
+
+#[test]
+fn motion_without_frames_and_with_too_many_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("none.bvh"), chain_motion(2, 0)).unwrap();
+    let rig =
+        "(format: 2, name: \"n\", joints: [(label: \"j0\"), (label: \"j1\", parent: \"j0\", translation: (0, 1, 0))])";
+    fs::write(folder.path().join("two.rig.ron"), rig).unwrap();
+    let text = long_clip(10).replace("10.0", "3e38");
+    fs::write(folder.path().join("long.anim.ron"), text).unwrap();
+    fs::write(folder.path().join("empty.ron"), "[Stroke(points: [], joints: 5)]").unwrap();
+    fs::copy(asset("models/head.obj"), folder.path().join("head.obj")).unwrap();
+    let cases: [(&[&str], &[&str]); 3] = [
+        (&["animate", "two.rig.ron", "none.bvh", "-o", "out.glb"], &["none.bvh", "no frames"]),
+        (&["animate", "biped", "long.anim.ron", "-o", "out.glb"], &["slow", "more than a million million frames"]),
+        (&["sketch", "head.obj", "empty.ron", "-o", "out.glb"], &["empty.ron", "no joint", "gesture 1"]),
+    ];
+    for (args, wanted) in cases {
+        let (ended, answer) = json_answer(folder.path(), args);
+        assert_eq!(ended.code, Some(1), "{args:?}: {answer:.600}");
+        let told = explained(&answer);
+        assert!(wanted.iter().all(|part| told.contains(part)), "{args:?}: {told}");
+        assert!(!folder.path().join("out.glb").exists(), "{args:?}");
     }
 }
 

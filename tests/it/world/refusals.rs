@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use bevy::prelude::*;
 use rigsmith::{
+    headless::Workbench,
     plugins::{
         commands::{Attributes, BuildResult, BuildStep, BuiltEntities},
         controls::NodeVisible,
@@ -248,4 +249,19 @@ fn a_visibility_of_somebody_else_is_put_back() {
     assert_eq!(refused(&mut stage), ["NodeVisible"]);
     assert_eq!(stage.get::<NodeVisible>(control), Some(&before));
     assert_eq!(stage.get::<NodeVisible>(own), Some(&NodeVisible(false)));
+}
+
+/// A write that is refused in the frame of an operation is no answer to the operation.
+#[test]
+fn an_operation_is_refused_for_reasons_of_its_own() {
+    let mut bench = Workbench::with_rig(7, template("arm"));
+    bench.build(BuildStep::All);
+    let control = bench.built().unwrap().nodes.iter().find(|node| node.control.is_some()).unwrap().uid;
+    let (rig, root) = (bench.rig_entity(), bench.rig().roots()[0]);
+    let world = bench.app_mut().world_mut();
+    let entity = world.get::<BuiltEntities>(rig).unwrap().get(control).unwrap();
+    world.entity_mut(entity).insert(NodeLabel("mine".to_owned()));
+    assert_eq!(bench.operate(Operation::Lock(vec![root], true)), Ok(()));
+    assert!(bench.rig().joint(root).unwrap().data.locked);
+    assert!(bench.operate(Operation::Lock(vec![Uid(1)], true)).is_err());
 }

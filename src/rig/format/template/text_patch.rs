@@ -49,10 +49,11 @@ pub fn write_template_over(rig: &Rig, source: &str) -> Option<String> {
 }
 
 fn written_over(rig: &Rig, source: &str) -> Option<String> {
-    let before = read_text(source, 1).ok()?.rig;
+    let mut before = read_text(source, 1).ok()?.rig;
     if before.uid() != rig.uid() {
         return None;
     }
+    share_equal_joints(&mut before, rig);
     let declared = Declarations::find(source)?;
     let mut rewriter = Rewriter::new(rig, &before, &declared);
     header_labels(&mut rewriter.patch, &declared.tree, &before, rig);
@@ -198,11 +199,11 @@ impl<'d, 'a> Rewriter<'d, 'a> {
         self.inputs();
         self.joints();
         self.poses();
-        let (has_fresh, declared, with_names) = (self.has_fresh(), self.declared, self.with_names);
+        let (has_unsettled, declared, with_names) = (self.has_unsettled(), self.declared, self.with_names);
         let text = self.patch.text();
         // What names were looked up in makes room for what is read to lay joints out.
         drop((self.names, self.index));
-        if has_fresh { settled(text, declared, with_names) } else { text }
+        if has_unsettled { settled(text, declared, with_names) } else { text }
     }
 
     fn header(&mut self) {

@@ -60,10 +60,16 @@ pub(super) fn is_short(declared: &Declarations) -> bool {
 }
 
 impl<'d> Rewriter<'d, '_> {
-    /// Returns `true` if a joint or a tag comes into the text.
-    pub(super) fn has_fresh(&self) -> bool {
+    /// Returns `true` if a joint or a tag comes into the text that may have another layout than a formatted text. A joint beside
+    /// others has its layout when it comes, and no uid too many in a text that has them all.
+    pub(super) fn has_unsettled(&self) -> bool {
         let is_known = |uid: Uid| self.before.is_taken(uid);
-        self.rig.walk().any(|joint| !is_known(joint.data.uid) || joint.data.tags.iter().any(|tag| !is_known(tag.uid)))
+        let stays = |one: &Declaration| self.rig.joint(one.uid).is_some();
+        let has_layout = !self.with_names && self.declared.joints.iter().any(stays);
+        self.rig.walk().any(|joint| match is_known(joint.data.uid) {
+            true => joint.data.tags.iter().any(|tag| !is_known(tag.uid)),
+            false => !has_layout,
+        })
     }
 
     /// Text of a tag.
@@ -166,6 +172,10 @@ fn without_derived(text: &str, known: &HashSet<Uid>) -> Option<String> {
 
 /// The text with joints in their layout that have something that came, unless they had another layout before.
 fn laid_out_joints(text: &str, before: &Declarations, known: &HashSet<Uid>) -> Option<String> {
+    // No joint begins the line on which the rig does.
+    if !text.contains('\n') {
+        return None;
+    }
     let declared = Declarations::find(text)?;
     let was: HashMap<Uid, &Declaration> = before.joints.iter().map(|joint| (joint.uid, joint)).collect();
     let mut changes: Vec<(Range<usize>, String)> = Vec::new();
