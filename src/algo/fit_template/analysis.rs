@@ -107,7 +107,8 @@ impl MeshAnalysis {
         if let Some(core) = mirror.and_then(|plane| symmetry::core(&graph, &voxels, &plane)) {
             trees.extend(tree::trees(&core, TreeRole::Carrier));
         }
-        trees.extend(tree::trees(&graph, TreeRole::ShortLegs));
+        let of_short_legs = tree::of_short_legs(&graph, &trees);
+        trees.extend(of_short_legs);
         step(1.0)?;
         if trees.is_empty() {
             return Err(FitError::NoSurface);
@@ -175,7 +176,8 @@ impl MeshAnalysis {
         if template.is_on_fours() && found.first().is_none_or(|best| best.posed_cost() > POOR) {
             found = assign(&|_| true);
         }
-        let ends = self.trees.iter().map(|t| t.branches.leaves.len()).max().unwrap_or(0);
+        let usual = self.trees.iter().filter(|tree| !tree.is_last_resort());
+        let ends = usual.map(|tree| tree.branches.leaves.len()).max().unwrap_or(0);
         let wanted = template.limbs.len();
         let shown = found.first().map_or(0, |best| best.leaves.iter().filter(|l| l.is_some()).count());
         if shown * 2 < wanted { Err(FitError::TooFewLimbs { found: ends, wanted }) } else { Ok(found) }

@@ -32,6 +32,17 @@ pub(super) enum TreeRole {
 }
 
 impl Tree {
+    fn new(graph: &VoxelGraph, centre: Centre, role: TreeRole) -> Self {
+        let detail = if role == TreeRole::ShortLegs { Detail::ShortLimbs } else { Detail::Limbs };
+        let branches = branches::branches(graph, centre.node, detail);
+        let lines = (0..branches.arcs.len()).map(|arc| CentreLine::new(graph, &branches, arc)).collect();
+        let has_forks = !branches.bearers.is_empty();
+        let roots = branches.arcs.iter().filter(|arc| arc.parent.is_none());
+        let depths = roots.flat_map(|arc| arc.slices.iter().map(|s| s.depth));
+        let trunk_thickness = depths.fold(1.0, f32::max);
+        Self { branches, lines, has_forks, trunk_thickness, centre, role }
+    }
+
     /// True if a template is tried with it.
     pub(super) fn suits(&self, template: &TemplateLimbs) -> bool {
         match self.role {
@@ -58,18 +69,11 @@ fn is_lying(template: &TemplateLimbs) -> bool {
 
 /// The trees of a volume, one for each place that may be its centre.
 pub(super) fn trees(graph: &VoxelGraph, role: TreeRole) -> Vec<Tree> {
-    let detail = if role == TreeRole::ShortLegs { Detail::ShortLimbs } else { Detail::Limbs };
-    branches::centres(graph)
-        .into_iter()
-        .filter(|centre| role != TreeRole::ShortLegs || centre.is_lying)
-        .map(|centre| {
-            let branches = branches::branches(graph, centre.node, detail);
-            let lines = (0..branches.arcs.len()).map(|arc| CentreLine::new(graph, &branches, arc)).collect();
-            let has_forks = !branches.bearers.is_empty();
-            let roots = branches.arcs.iter().filter(|arc| arc.parent.is_none());
-            let depths = roots.flat_map(|arc| arc.slices.iter().map(|s| s.depth));
-            let trunk_thickness = depths.fold(1.0, f32::max);
-            Tree { branches, lines, has_forks, trunk_thickness, centre, role }
-        })
-        .collect()
+    branches::centres(graph).into_iter().map(|centre| Tree::new(graph, centre, role)).collect()
+}
+
+/// The trees for animals with short legs, with the centres that others of the same volume have.
+pub(super) fn of_short_legs(graph: &VoxelGraph, trees: &[Tree]) -> Vec<Tree> {
+    let usual = trees.iter().filter(|tree| tree.role == TreeRole::Usual && tree.centre.is_lying);
+    usual.map(|tree| Tree::new(graph, tree.centre, TreeRole::ShortLegs)).collect()
 }
