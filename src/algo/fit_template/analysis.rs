@@ -12,7 +12,7 @@ use super::{
     markers::Marker,
     symmetry::{self, MirrorPlane},
     target,
-    tree::{self, Tree},
+    tree::{self, Tree, TreeRole},
     volume,
 };
 use crate::mesh::{surface::Surface, voxels::Voxels};
@@ -30,6 +30,9 @@ const BLOCK: usize = 250_000;
 const FLAT: f32 = 0.004;
 /// Distance from the volume from which on a marker lies outside of it, in unit space.
 const OUTSIDE: f32 = 0.05;
+
+/// Penalty of an assignment from which on an animal may have shorter legs than are seen.
+const POOR: f32 = 0.75;
 
 /// Times that a mesh is looked at without parts that are too far from the body: from nearer, there may be more of them.
 const NEARER: usize = 3;
@@ -97,13 +100,15 @@ impl MeshAnalysis {
         let Look { mesh, voxels, surface, target, mut graph } = look;
         graph.loose = loose.max(graph.loose);
         step(0.7)?;
-        let mut trees = tree::trees(&graph);
+        let mut trees = tree::trees(&graph, TreeRole::Usual);
         let file_axes = [Vec3::X, Vec3::Y, Vec3::Z].map(|d| mesh.space.direction_to_unit(d));
         let mirror = symmetry::of_mesh(&graph, &voxels, file_axes);
         // A staff or a shield in one hand bends the centre lines of the whole arm: without it they are tried, too.
         if let Some(core) = mirror.and_then(|plane| symmetry::core(&graph, &voxels, &plane)) {
-            trees.extend(tree::trees(&core));
+            trees.extend(tree::trees(&core, TreeRole::Carrier));
         }
+        let of_short_legs = tree::of_short_legs(&graph, &trees);
+        trees.extend(of_short_legs);
         step(1.0)?;
         if trees.is_empty() {
             return Err(FitError::NoSurface);
@@ -164,8 +169,15 @@ impl MeshAnalysis {
         };
         let told = markers.iter().filter(|marker| !marker.is_alone());
         let limb_markers: Vec<LimbMarker> = told.filter_map(of_limb).collect();
-        let found = assign::assign(&self.graph, &self.trees, template, &directions, &limb_markers);
-        let ends = self.trees.iter().map(|t| t.branches.leaves.len()).max().unwrap_or(0);
+        let assign = |is_tried: &dyn Fn(&Tree) -> bool| {
+            assign::assign(&self.graph, &self.trees, template, &directions, &limb_markers, is_tried)
+        };
+        let mut found = assign(&|tree| !tree.is_last_resort());
+        if template.is_on_fours() && found.first().is_none_or(|best| best.posed_cost() > POOR) {
+            found = assign(&|_| true);
+        }
+        let usual = self.trees.iter().filter(|tree| !tree.is_last_resort());
+        let ends = usual.map(|tree| tree.branches.leaves.len()).max().unwrap_or(0);
         let wanted = template.limbs.len();
         let shown = found.first().map_or(0, |best| best.leaves.iter().filter(|l| l.is_some()).count());
         if shown * 2 < wanted { Err(FitError::TooFewLimbs { found: ends, wanted }) } else { Ok(found) }

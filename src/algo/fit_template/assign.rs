@@ -118,6 +118,7 @@ pub(super) fn assign(
     template: &TemplateLimbs,
     directions: &Directions,
     markers: &[LimbMarker],
+    is_tried: &dyn Fn(&Tree) -> bool,
 ) -> Vec<Hypothesis> {
     let of_tree = |(number, tree): (usize, &Tree)| {
         let branches = &tree.branches;
@@ -136,7 +137,7 @@ pub(super) fn assign(
         found.iter().flat_map(|(cost, chosen)| search.sided(*cost, chosen)).collect::<Vec<Hypothesis>>()
     };
     let mut hypotheses: Vec<Hypothesis> =
-        trees.iter().enumerate().filter(|(_, tree)| tree.suits(template)).flat_map(of_tree).collect();
+        trees.iter().enumerate().filter(|(_, tree)| is_tried(tree) && tree.suits(template)).flat_map(of_tree).collect();
     let rank = |h: &Hypothesis| h.cost + if trees[h.tree].is_usual(template) { 0.0 } else { OTHER_CENTRE };
     hypotheses.sort_by(|a, b| {
         rank(a).total_cmp(&rank(b)).then_with(|| a.tree.cmp(&b.tree)).then_with(|| a.leaves.cmp(&b.leaves))

@@ -11,6 +11,8 @@ use super::volume::{FAR, VoxelGraph};
 
 /// Length of a branch below which it is a bump, as a share of the largest distance from the centre.
 const BUMP: f32 = 0.075;
+/// The same where short limbs of a long body are looked for.
+const FINE_BUMP: f32 = 0.05;
 /// Length of an arc that is no more than an ear on a head, as a share of the largest distance from the centre.
 const SHORT: f32 = 0.62;
 /// Length of a child of an arc that is no more than a finger on an arm, as a share of the arc.
@@ -108,12 +110,21 @@ impl Branches {
     }
 }
 
+/// What of a volume is a branch of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Detail {
+    /// Limbs; short ones that a long one bears are fingers of a hand.
+    Limbs,
+    /// Short limbs, too, which a long trunk bears at its ends.
+    ShortLimbs,
+}
+
 /// Finds the branches of `graph` as seen from a centre.
-pub(super) fn branches(graph: &VoxelGraph, centre: u32) -> Branches {
+pub(super) fn branches(graph: &VoxelGraph, centre: u32, detail: Detail) -> Branches {
     let distance = graph.distances(&[(centre, 0)]);
     let reach = distance.iter().zip(&graph.body).filter(|(_, b)| **b).map(|(d, _)| *d).filter(|&d| d != FAR).max();
     let reach = reach.unwrap_or(0);
-    let bump = (reach as f32 * BUMP) as u32;
+    let bump = (reach as f32 * if detail == Detail::Limbs { BUMP } else { FINE_BUMP }) as u32;
     let mut order: Vec<u32> =
         (0..graph.len() as u32).filter(|&n| graph.body[n as usize] && distance[n as usize] != FAR).collect();
     order.sort_unstable_by_key(|&n| (std::cmp::Reverse(distance[n as usize]), n));
@@ -202,7 +213,9 @@ pub(super) fn branches(graph: &VoxelGraph, centre: u32) -> Branches {
     let short = |a: usize| furthest[a] - arcs[a].far <= (reach as f32 * SHORT) as u32;
     // Of fingers on a hand, which are short against the arm, the longest one stands for all.
     let mut minor = vec![false; arcs.len()];
-    for hand in (0..arcs.len()).filter(|&a| alias[a] == a && !arcs[a].children.is_empty() && arcs[a].parent.is_some()) {
+    let is_hand =
+        |a: usize| detail == Detail::Limbs && alias[a] == a && !arcs[a].children.is_empty() && arcs[a].parent.is_some();
+    for hand in (0..arcs.len()).filter(|&a| is_hand(a)) {
         let own = arcs[hand].far.saturating_sub(arcs[hand].near) as f32;
         if (furthest[hand] - arcs[hand].far) as f32 > FINGER * own {
             continue;

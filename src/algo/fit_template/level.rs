@@ -20,6 +20,10 @@ const STANDS: f32 = 0.8;
 /// Distance between front and hind feet, as a share of the template's in the alignment's scale, above which they tell the
 /// ground.
 const APART: f32 = 0.4;
+/// Height of the ends of forelegs over those of hind legs from which on an animal stands on its hind legs, and the most of what
+/// hind legs may end over the lowest end, as shares of the height of the template's hips in the alignment's scale.
+const RAISED: f32 = 0.3;
+const ON_GROUND: f32 = 0.15;
 
 /// Turns a hypothesis to how an animal stands, and tells how a bird's trunk lies and where its middle is.
 pub(super) fn stand(template: &TemplateLimbs, tree: &Tree, hypothesis: &mut Hypothesis, directions: &Directions) {
@@ -46,9 +50,30 @@ pub(super) fn level(
     if way.length() < APART * hypothesis.alignment.scale * rest.length() {
         return None;
     }
-    // A ground that a person tells is level.
-    let way = directions.up.map_or(way, |up| way - up * way.dot(up));
+    // A ground that a person tells is level, and so is that of an animal on its hind legs.
+    let up = directions.up.or_else(|| up_on_hind_legs(template, tree, hypothesis, way, directions));
+    let way = up.map_or(way, |up| way - up * way.dot(up));
     turned_by(turn, rest, way, directions)
+}
+
+/// The axis of the file along which an animal stands on its hind legs: its forelegs, such as the arms of a dinosaur, end high above
+/// the hind feet by the way from these to those, and nothing lies below the hind feet. `None` for one that stands on all legs.
+fn up_on_hind_legs(
+    template: &TemplateLimbs,
+    tree: &Tree,
+    hypothesis: &Hypothesis,
+    way: Vec3,
+    directions: &Directions,
+) -> Option<Vec3> {
+    let scale = hypothesis.alignment.scale;
+    let up = hypothesis.alignment.rotation * Vec3::Y;
+    let axis = directions.file_axes.into_iter().flat_map(|axis| [axis, -axis]).find(|axis| axis.dot(up) > STANDS)?;
+    let height = |leaf: usize| tree.lines[leaf].at(0.0).dot(axis);
+    let lowest = tree.branches.leaves.iter().map(|&leaf| height(leaf)).fold(f32::INFINITY, f32::min);
+    let legs = template.limbs.iter().zip(&hypothesis.leaves).filter(|(limb, _)| template.is_hind_leg(limb));
+    let hind = legs.filter_map(|(_, leaf)| Some(height((*leaf)?))).fold(f32::NEG_INFINITY, f32::max);
+    let tall = scale * template.positions[*template.trunk.first()?].y;
+    (way.dot(axis) > RAISED * tall && hind - lowest < ON_GROUND * tall).then_some(axis)
 }
 
 /// The turn of a bird, whose trunk lies between its tail and its neck as the template's does: wings and legs, which are posed,

@@ -109,7 +109,7 @@ pub(super) fn place(template: &TemplateLimbs, tree: &Tree, graph: &VoxelGraph, h
         }
         work.hold_bends(limb, line, &lengths, &mut places);
         work.keep_over_foot(limb, line, &lengths, &mut places);
-        work.stand_on_sole(limb, *leaf, &mut places);
+        work.stand_on_sole((limb, *leaf), line, &lengths, &mut places);
     }
     work.carry_by_legs(&mut places);
     work.hang_tail(&mut places);

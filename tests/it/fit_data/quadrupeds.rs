@@ -15,32 +15,33 @@ const ENDS: [&str; 6] = ["paw_l", "paw_r", "foot_l", "foot_r", "head", "tail_6"]
 
 /// Forms with the most that joints of the fox and of the dog are off in the mean, in hundredths of the height; 4 was asked for.
 /// Rules were chosen on these.
-const KNOWN_BOUNDS: [(&str, [f32; 2]); 14] = [
-    ("long legs", [4.1, 4.6]),
+const KNOWN_BOUNDS: [(&str, [f32; 2]); 15] = [
+    ("long legs", [3.8, 4.6]),
     ("grazing", [4.1, 5.9]),
-    ("big head", [4.0, 4.1]),
-    ("wide", [4.3, 4.9]),
-    ("tail up", [3.9, 3.5]),
-    ("short tail", [3.6, 5.0]),
-    ("giraffe", [4.0, 4.5]),
+    ("big head", [3.7, 4.1]),
+    ("wide", [3.9, 4.9]),
+    ("tail up", [3.5, 3.5]),
+    ("short tail", [3.2, 5.0]),
+    ("giraffe", [3.5, 4.5]),
     ("lizard", [5.3, 5.9]),
-    ("walk", [3.7, 8.9]),
-    ("hanging tail", [4.3, 4.2]),
+    ("walk", [3.7, 4.5]),
+    ("hanging tail", [3.7, 4.2]),
     ("stalk", [7.3, 5.4]),
     ("bear", [3.5, 7.8]),
     ("calf", [4.0, 7.1]),
+    ("dachshund", [6.0, 5.9]),
     ("dinosaur", [4.5, 4.6]),
 ];
 /// The same for forms that are measured only.
 const UNSEEN_BOUNDS: [(&str, [f32; 2]); 10] = [
     ("short legs", [4.9, 5.1]),
-    ("raised neck", [3.2, 3.7]),
-    ("narrow", [3.8, 4.4]),
+    ("raised neck", [2.8, 3.7]),
+    ("narrow", [3.5, 4.4]),
     ("tail down", [7.2, 5.4]),
     ("crouch", [7.0, 5.7]),
-    ("arched back", [4.5, 4.0]),
+    ("arched back", [4.0, 4.0]),
     ("large feet", [3.5, 7.0]),
-    ("horse", [4.2, 4.8]),
+    ("horse", [3.7, 4.8]),
     ("sauropod", [4.4, 5.8]),
     ("step", [4.8, 4.7]),
 ];
@@ -108,7 +109,8 @@ fn check(figures: &[FittedFigure], bounds: &[(&str, [f32; 2])]) {
 }
 
 /// All limbs are assigned right in all forms. While the length of a tail counted as those of other limbs do, a thick and long one
-/// had no branch.
+/// had no branch; while short legs at the ends of a long trunk were fingers of a hand, a fox with those of a dachshund was off by 180;
+/// while a load on one side was looked for in animals that walk, a dog that does was without its feet, and off by 8.
 #[test]
 fn animals_of_other_forms_are_fitted() {
     let Some(figures) = known() else { return };

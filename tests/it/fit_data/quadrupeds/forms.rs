@@ -175,7 +175,7 @@ impl Form {
 pub type NamedForm = (&'static str, &'static [Change], Option<usize>);
 
 /// Forms on which rules were chosen.
-pub const KNOWN: [NamedForm; 14] = [
+pub const KNOWN: [NamedForm; 15] = [
     ("long legs", &[Change::Legs(1.5)], None),
     ("grazing", &[Change::Nod(20.0), Change::Neck(-75.0, 1.2)], None),
     ("big head", &[Change::Head(1.6)], None),
@@ -212,6 +212,7 @@ pub const KNOWN: [NamedForm; 14] = [
         &[Change::Width(0.8), Change::Legs(1.6), Change::Head(1.3), Change::Tail(-80.0, 0.0, 0.5, 0.5)],
         Some(1000),
     ),
+    ("dachshund", &[Change::Legs(0.4), Change::Length(1.8)], None),
     (
         "dinosaur",
         &[
