@@ -5,6 +5,7 @@ use std::{collections::BTreeSet, path::Path};
 use glam::Vec3;
 use rigsmith::algo::face::{
     auto::{AutoFace, AutoSettings, FaceAnalysis},
+    bones::Region,
     expression::{ExpressionSet, Mix, Sides, apply},
 };
 
