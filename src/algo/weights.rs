@@ -33,6 +33,7 @@ mod hierarchy;
 mod islands;
 mod keypoints;
 pub(crate) mod laplacian;
+mod layers;
 pub(crate) mod ldl;
 mod limb_parts;
 mod odds;

@@ -2,6 +2,7 @@
 
 mod gear;
 mod inputs;
+mod layers;
 mod pieces;
 mod trunks;
 

@@ -12,8 +12,9 @@ pub(crate) const SHARES: usize = 4;
 const HEAT: f32 = 12.0;
 /// Bones whose reach is up to this much longer than the shortest share the point.
 const BAND: f32 = 0.1;
-/// A patch that its joint sees less of than this is not its own.
-const SEEN: f32 = 0.25;
+/// A patch that its joint sees less of than this is not its own. Between toes the skin of a tight shoe crosses itself and hides half
+/// of it and more.
+const SEEN: f32 = 0.2;
 /// Share by which the reach that a bone needs grows where the skin lies along the way to the bone rather than across it, when the
 /// two bones of a strong fold are compared; and twice as much where the skin faces towards the bone, as the palm of a fist faces
 /// the fingers.
@@ -54,8 +55,11 @@ pub(crate) fn claims(
         .flat_map_iter(|(number, chunk)| {
             let mut near = Vec::new();
             let first = number * CHUNK;
-            let skin = chunk.iter().zip(&normals[first..]).map(|(&point, &normal)| Skin { point, normal });
-            skin.enumerate().map(move |(at, skin)| claim(first + at, skin, bones, sight, &mut near))
+            let skin = (first..).zip(chunk.iter().zip(&normals[first..]));
+            skin.map(move |(index, (&point, &normal))| {
+                let skin = Skin { point, island: sight.island(index), normal };
+                claim(index, skin, bones, sight, &mut near)
+            })
         })
         .collect();
     for leak in leaks(&claims, graph) {
@@ -130,6 +134,8 @@ fn reach(distance: f32, girth: f32) -> f32 {
 #[derive(Debug, Clone, Copy)]
 struct Skin {
     point: Vec3,
+    /// The island that it is of.
+    island: usize,
     /// Outward normal, shorter where the skin turns.
     normal: Vec3,
 }
@@ -138,7 +144,7 @@ impl Skin {
     /// Reach that a bone needs for this point, and cosine of the angle between the normal and the way from the bone.
     fn reach(self, bones: &Bones, bone: u32) -> (f32, f32) {
         let way = self.point - closest_on(&bones.segments[bone as usize], self.point);
-        (reach(way.length(), bones.girths[bone as usize]), self.normal.dot(way.normalize_or_zero()))
+        (reach(way.length(), bones.girth(bone, self.island)), self.normal.dot(way.normalize_or_zero()))
     }
 
     /// The reach by which the bones of a fold of a given strength are compared.
@@ -183,7 +189,7 @@ impl Skin {
 /// The claim on the point of an index; `near` is scratch space.
 fn claim(index: usize, skin: Skin, bones: &Bones, sight: &Sight, near: &mut Vec<(f32, u32)>) -> Claim {
     let mut result = Claim::default();
-    let (point, island) = (skin.point, sight.island(index));
+    let Skin { point, island, .. } = skin;
     let may_hold = |bone: u32| bones.may_hold(bone, island);
     let cost = |bone: u32| if may_hold(bone) { skin.reach(bones, bone).0 } else { f32::INFINITY };
     bones.tree.nearest(point, BAND, cost, near);

@@ -5,14 +5,15 @@ use std::collections::BTreeMap;
 use glam::Vec3;
 
 use super::{
-    Method, WeightJoint, bone::BoneSegment, claim::Claim, grips::Grips, laplacian::Graph, report::Stiffness,
-    rings::RingBones, sight::is_surrounded,
+    Method, WeightJoint, bone::BoneSegment, claim::Claim, grips::Grips, laplacian::Graph, limb_parts::small_limbs,
+    report::Stiffness, rings::RingBones, sight::is_surrounded,
 };
 use crate::mesh::{adjacency, model::Weights, surface::Surface};
 
 /// Heat is trusted on an island if at least this share of its area sees the bone that claims it.
 const SEEN: f32 = 0.15;
-/// Islands up to this size beside a mesh of size 2 move with what is around them: specks, buttons, teeth.
+/// Islands up to this size beside a mesh of size 2 move with what is around them: specks, buttons, teeth. Hands of their own, through
+/// which bones run, do not.
 const SPECK: f32 = 0.2;
 
 /// A part moves with one joint if that joint holds at least this share of it.
@@ -29,28 +30,37 @@ pub(crate) struct Islands {
     pub of: Vec<u32>,
     /// The longest side of each island's box.
     pub extents: Vec<f32>,
+    /// Flag of each island: whether it is small beside the whole mesh, and no limb.
+    small: Vec<bool>,
 }
 
 impl Islands {
-    /// Finds the pieces of a welded surface.
-    pub fn new(places: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+    /// Finds the pieces of a welded surface around joints.
+    pub fn new(places: &[Vec3], triangles: &[[u32; 3]], joints: &[WeightJoint]) -> Self {
         let (of, count) = adjacency::islands(triangles, places.len());
-        let mut boxes = vec![(Vec3::INFINITY, Vec3::NEG_INFINITY); count];
+        let mut boxes = vec![[Vec3::INFINITY, Vec3::NEG_INFINITY]; count];
         for (&island, &place) in of.iter().zip(places) {
-            let (low, high) = &mut boxes[island as usize];
+            let [low, high] = &mut boxes[island as usize];
             (*low, *high) = (low.min(place), high.max(place));
         }
-        Self { of, extents: boxes.into_iter().map(|(low, high)| (high - low).max_element()).collect() }
+        let extents: Vec<f32> = boxes.iter().map(|[low, high]| (*high - *low).max_element()).collect();
+        let mut small: Vec<bool> = extents.iter().map(|extent| *extent < SPECK).collect();
+        if count > 1 {
+            for island in small_limbs(&small, &boxes, &of, (places, triangles), joints) {
+                small[island] = false;
+            }
+        }
+        Self { of, extents, small }
     }
 
-    /// True if the island of a place is small beside the whole mesh.
+    /// True if the island of a place is small beside the whole mesh, and no limb.
     pub fn is_small(&self, place: usize) -> bool {
         self.are_small(self.of[place] as usize)
     }
 
-    /// True if an island is small beside the whole mesh.
+    /// True if an island is small beside the whole mesh, and no limb.
     pub fn are_small(&self, island: usize) -> bool {
-        self.extents[island] < SPECK
+        self.small[island]
     }
 
     /// Flag of each place: whether its island can be bound by heat.
