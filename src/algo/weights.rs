@@ -14,6 +14,7 @@
 //! one joint holds stay stiff, and so do rings around a bone; large meshes are solved on a coarser surface.
 
 mod anatomy;
+mod attachments;
 pub mod bends;
 mod bind;
 pub mod bone;

@@ -1,5 +1,6 @@
 //! Automatic skin weights: what holds of every result, and what bodies, damage, locks and bad input give.
 
+mod attachments;
 mod gear;
 mod inputs;
 mod layers;

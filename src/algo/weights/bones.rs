@@ -50,6 +50,11 @@ impl Bones {
         self.homes.may_hold(bone, self.segments[bone as usize].joint, island)
     }
 
+    /// True if a joint is at home in an island of several.
+    pub fn is_resident(&self, joint: u32, island: usize) -> bool {
+        self.homes.is_resident(joint, island)
+    }
+
     /// Usual reach around a bone of its flesh, or of the clothes of an island that is around the flesh.
     pub fn girth(&self, bone: u32, island: usize) -> f32 {
         let is_over = is_over(self.flesh[bone as usize], self.segments[bone as usize].joint, island, &self.homes);

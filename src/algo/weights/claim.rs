@@ -12,9 +12,10 @@ pub(crate) const SHARES: usize = 4;
 const HEAT: f32 = 12.0;
 /// Bones whose reach is up to this much longer than the shortest share the point.
 const BAND: f32 = 0.1;
-/// A patch that its joint sees less of than this is not its own. Between toes the skin of a tight shoe crosses itself and hides half
-/// of it and more.
-const SEEN: f32 = 0.2;
+/// A patch that its joint sees less of than this is not its own.
+const SEEN: f32 = 0.25;
+/// The same of a joint inside of one of several pieces: a tight shoe crosses itself between toes and hides most of itself there.
+const SEEN_AT_HOME: f32 = 0.1;
 /// Share by which the reach that a bone needs grows where the skin lies along the way to the bone rather than across it, when the
 /// two bones of a strong fold are compared; and twice as much where the skin faces towards the bone, as the palm of a fist faces
 /// the fingers.
@@ -62,7 +63,7 @@ pub(crate) fn claims(
             })
         })
         .collect();
-    for leak in leaks(&claims, graph) {
+    for leak in leaks(&claims, bones, graph, sight) {
         claims[leak as usize].heat = 0.0;
     }
     claims
@@ -71,7 +72,7 @@ pub(crate) fn claims(
 /// Points that their joint does not hold: of patches of which it sees little, and of patches across the air from its
 /// bone that border on other joints, as the flank beside an arm that hangs down. Nostrils and the mouth lie across the
 /// air from the skull, too, but all around them is the head's.
-fn leaks(claims: &[Claim], graph: &Graph) -> Vec<u32> {
+fn leaks(claims: &[Claim], bones: &Bones, graph: &Graph, sight: &Sight) -> Vec<u32> {
     let joint = |v: usize| claims[v].shares[0].0;
     let mut leaks = Vec::new();
     let held = |v: usize| claims[v].heat > 0.0;
@@ -79,7 +80,10 @@ fn leaks(claims: &[Claim], graph: &Graph) -> Vec<u32> {
         let sum = |seen: bool| {
             patch.iter().filter(|v| !seen || claims[**v as usize].seen).map(|v| graph.areas[*v as usize]).sum::<f32>()
         };
-        if sum(true) < SEEN * sum(false) {
+        let first = patch[0] as usize;
+        let is_at_home = bones.is_resident(joint(first), sight.island(first));
+        let least = if is_at_home { SEEN_AT_HOME } else { SEEN };
+        if sum(true) < least * sum(false) {
             leaks.extend(patch);
         }
     }
