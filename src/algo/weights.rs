@@ -11,7 +11,7 @@
 //! to the bones inside of it, and joints that stand off from the body (roots, targets, poles) hold nothing; skin whose
 //! bone lies across the air is left to its neighbours; skin on the inside of a chain that is folded at rest belongs to the
 //! bone that it faces away from; arms, legs and necks share flesh as painted bodies do; pieces that
-//! one joint holds stay stiff, and so do rings around a bone; large meshes are solved on a coarser surface.
+//! one joint holds stay stiff, and so do rings around a bone and gear without bones; large meshes are solved on a coarser surface.
 
 mod anatomy;
 mod attachments;

@@ -17,7 +17,7 @@ use crate::mesh::{adjacency, model::Weights, surface::Surface};
 
 /// Pairs of bones and pieces that are looked at. In a crowd of shells around bones nothing is an attachment.
 const MOST: usize = 1 << 12;
-/// What is at most this share of a piece's size farther away than its nearest place touches the body.
+/// Places of a piece touch the body if they are at most this share of the piece's size farther away from it than the nearest one.
 const TOUCH: f32 = 0.1;
 /// The places at which a hanging piece touches the body span at most this share of its size.
 const ROOT: f32 = 0.33;

@@ -14,7 +14,8 @@ const HEAT: f32 = 12.0;
 const BAND: f32 = 0.1;
 /// A patch that its joint sees less of than this is not its own.
 const SEEN: f32 = 0.25;
-/// The same of a joint inside of one of several pieces: a tight shoe crosses itself between toes and hides most of itself there.
+/// The least such share of a patch on a piece that its joint lies inside of: a tight shoe crosses itself between toes and hides most
+/// of itself there.
 const SEEN_AT_HOME: f32 = 0.1;
 /// Share by which the reach that a bone needs grows where the skin lies along the way to the bone rather than across it, when the
 /// two bones of a strong fold are compared; and twice as much where the skin faces towards the bone, as the palm of a fist faces

@@ -63,7 +63,8 @@ fn skin_that_hides_itself_is_held_by_what_is_inside() {
     let foot = [&[[0.0, 0.0]], &straight(0.0, 3.8, 0.2)[..], &[[3.8, 0.0]]].concat();
     add_hose(&mut points, &mut triangles, &foot);
     let mut rings = straight(0.0, 3.9, 0.3);
-    for (from, to, radius) in [(3.8, 3.0, 0.29), (3.0, 3.8, 0.28), (3.8, 3.0, 0.27)] {
+    for (from, to, radius) in [(3.8, 3.0, 0.29), (3.0, 3.8, 0.28), (3.8, 3.0, 0.27), (3.0, 3.8, 0.26), (3.8, 3.0, 0.25)]
+    {
         rings.extend(straight(from, to, radius));
     }
     let shoe = add_hose(&mut points, &mut triangles, &rings);
