@@ -56,6 +56,33 @@ fn bodies_are_bound_as_without_what_they_wear() {
     }
 }
 
+/// A last joint near the skin stays in the flesh below hair that covers most of the head, whichever way the sheet of hair faces.
+#[test]
+fn joints_below_hair_stay_in_the_flesh() {
+    let mut joints = neck();
+    joints[2].head.y = -0.2;
+    let (points, triangles) = tube();
+    let naked = bind(&points, &triangles, &joints).0;
+    for faces_in in [false, true] {
+        let (mut points, mut triangles) = (points.clone(), triangles.clone());
+        let first = triangles.len();
+        let strand = |x: f32| -> Vec<Vec3> {
+            let angle = |side: usize| (side as f32 / 24.0 - 0.5) * 0.85 * TAU;
+            (0..=24).map(|side| Vec3::new(x, -0.45 * angle(side).cos(), 0.45 * angle(side).sin())).collect()
+        };
+        let rows: Vec<Vec<Vec3>> = heights(1.5, 4.5).into_iter().map(strand).collect();
+        let hair = add_sheet(&mut points, &mut triangles, &rows);
+        if faces_in {
+            triangles[first..].iter_mut().for_each(|triangle| triangle.swap(0, 1));
+        }
+        let weights = bind(&points, &triangles, &joints).0;
+        for point in 0..hair.start {
+            let [without, with] = [&naked, &weights].map(|weights| weight(weights, point, 2));
+            assert!((without - with).abs() < 0.02, "point {point} at {}: {without} {with}", points[point]);
+        }
+    }
+}
+
 /// A shoe so tight that most of its tip is hidden behind its own folds belongs to the toes inside of it.
 #[test]
 fn skin_that_hides_itself_is_held_by_what_is_inside() {
