@@ -11,9 +11,10 @@
 //! to the bones inside of it, and joints that stand off from the body (roots, targets, poles) hold nothing; skin whose
 //! bone lies across the air is left to its neighbours; skin on the inside of a chain that is folded at rest belongs to the
 //! bone that it faces away from; arms, legs and necks share flesh as painted bodies do; pieces that
-//! one joint holds stay stiff, and so do rings around a bone; large meshes are solved on a coarser surface.
+//! one joint holds stay stiff, and so do rings around a bone and gear without bones; large meshes are solved on a coarser surface.
 
 mod anatomy;
+mod attachments;
 pub mod bends;
 mod bind;
 pub mod bone;
@@ -34,6 +35,7 @@ mod holders;
 mod islands;
 mod keypoints;
 pub(crate) mod laplacian;
+mod layers;
 pub(crate) mod ldl;
 mod limb_parts;
 mod odds;

@@ -1,7 +1,9 @@
 //! Automatic skin weights: what holds of every result, and what bodies, damage, locks and bad input give.
 
+mod attachments;
 mod gear;
 mod inputs;
+mod layers;
 mod pieces;
 mod trunks;
 

@@ -85,7 +85,7 @@ pub(crate) fn bind(
     if settings.stiff_parts {
         let bending = settings.bending.iter().cloned().flatten();
         let bending: Vec<u32> = bending.filter_map(|point| place.get(point as usize).copied()).collect();
-        (weights, stiff) = Islands::new(&places, &triangles).stiffened(
+        (weights, stiff) = Islands::new(&places, &triangles, &joints).stiffened(
             (&places, &triangles),
             &weights,
             slots,
@@ -146,7 +146,7 @@ impl Job<'_> {
     /// Binds a surface without duplicate points, of unit size.
     fn run(&self, places: &[Vec3], triangles: &[[u32; 3]], graph: &Graph) -> Result<Bound, WeightError> {
         let method = self.settings.method;
-        let islands = Islands::new(places, triangles);
+        let islands = Islands::new(places, triangles, self.joints);
         let sight = Sight::new(places, triangles, &islands);
         self.step(0.2)?;
         let bones = bones::build(self.joints, self.takes_part, (self.claims, self.slots), places, &graph.areas, &sight);

@@ -14,6 +14,7 @@ use super::{
     folds::{Fold, folds},
     holders::Holders,
     keypoints,
+    layers::Layers,
     roots::{Homes, MANY_CHILDREN, Roots, parents_first},
     sight::Sight,
 };
@@ -33,10 +34,12 @@ const FEW: usize = 4;
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Bones {
     pub segments: Vec<BoneSegment>,
-    /// Usual reach of the flesh around each bone.
-    pub girths: Vec<f32>,
+    /// Usual reach of the flesh around each bone, and of the clothes around that.
+    girths: Vec<[f32; 2]>,
     /// The largest of them.
     pub largest_girth: f32,
+    /// Island that the flesh of each bone is, if one is around it.
+    flesh: Vec<Option<usize>>,
     /// Folds at which each bone may lose skin to another.
     pub folds: Vec<Vec<Fold>>,
     pub holders: Holders,
@@ -53,6 +56,17 @@ impl Bones {
     /// The joints that alone may hold an island; `None` if all may.
     pub fn joints_of(&self, island: usize) -> Option<&[u32]> {
         self.homes.joints_of(island)
+    }
+
+    /// True if a joint is at home in an island of several.
+    pub fn is_resident(&self, joint: u32, island: usize) -> bool {
+        self.homes.is_resident(joint, island)
+    }
+
+    /// Usual reach around a bone of its flesh, or of the clothes of an island that is around the flesh.
+    pub fn girth(&self, bone: u32, island: usize) -> f32 {
+        let is_over = is_over(self.flesh[bone as usize], self.segments[bone as usize].joint, island, &self.homes);
+        self.girths[bone as usize][usize::from(is_over)]
     }
 
     /// Bones without those of slots, for islands that are bound without regard to body parts.
@@ -132,14 +146,22 @@ pub(crate) fn build(
     }
     drop_repeats(&mut segments, &mut leaves, claims);
     let homes = Homes::new(joints, (claims, slots), &segments, points, sight);
-    grow_leaves(joints, &mut segments, &leaves, points, areas, (sight, &homes));
+    let layers = Layers::new(joints, homes.residents(), sight);
+    let mut flesh: Vec<Option<usize>> = segments.iter().map(|segment| layers.flesh(segment.joint)).collect();
+    let regions = leaf_regions(joints, &segments, &leaves, points, (sight, &homes));
+    for (&(segment, joint), mut region) in leaves.iter().zip(regions) {
+        let (owner, head) = (segments[segment].joint, joints[joint].head);
+        let inner = flesh_of_leaf(&mut region, owner, head, (points, areas), &layers, sight);
+        flesh[segment] = inner.or(flesh[segment]);
+        grow_leaf(joints, joint, &mut segments[segment], &region, (points, areas), sight);
+    }
     let holders = Holders::new(&segments);
-    let girths = girths(&segments, &holders, points, areas, (sight, &homes));
+    let girths = girths(&segments, &flesh, &holders, points, areas, (sight, &homes));
     let mut is_guess = vec![false; segments.len()];
     leaves.iter().for_each(|(segment, _)| is_guess[*segment] = true);
     let folds = folds(&segments, &is_guess);
-    let largest_girth = girths.iter().copied().fold(0.0, f32::max);
-    Bones { segments, girths, largest_girth, folds, holders, homes }
+    let largest_girth = girths.iter().flatten().copied().fold(0.0, f32::max);
+    Bones { segments, girths, largest_girth, flesh, folds, holders, homes }
 }
 
 /// True if the bone to `joint` turns back along the bone by which the chain arrived at its parent: an ear that hangs on
@@ -243,19 +265,22 @@ fn drop_repeats(segments: &mut Vec<BoneSegment>, leaves: &mut Vec<(usize, usize)
     segments.retain(|_| flags.next().copied().unwrap_or(true));
 }
 
-/// Lets the bones of last joints run through the flesh around the joint: towards the centroid of the surface that is
-/// nearest to the joint, and nearly as far as that surface reaches. The direction in which the chain arrives would miss
-/// the toes of a foot that was entered from above.
-fn grow_leaves(
+/// True if an island is around the flesh of a bone of a joint, as a sleeve is.
+fn is_over(flesh: Option<usize>, joint: u32, island: usize, homes: &Homes) -> bool {
+    flesh.is_some_and(|flesh| flesh != island) && homes.is_resident(joint, island)
+}
+
+/// The points that are nearest to the bone of each last joint and see the joint.
+fn leaf_regions(
     joints: &[WeightJoint],
-    segments: &mut [BoneSegment],
+    segments: &[BoneSegment],
     leaves: &[(usize, usize)],
     points: &[Vec3],
-    areas: &[f32],
     (sight, homes): (&Sight, &Homes),
-) {
+) -> Vec<Vec<u32>> {
+    let mut regions: Vec<Vec<u32>> = vec![Vec::new(); leaves.len()];
     if leaves.is_empty() {
-        return;
+        return regions;
     }
     let mut leaf_of = vec![usize::MAX; segments.len()];
     for (leaf, &(segment, _)) in leaves.iter().enumerate() {
@@ -267,7 +292,7 @@ fn grow_leaves(
         .enumerate()
         .flat_map_iter(|(number, chunk)| {
             let mut near = Vec::new();
-            let (segments, leaf_of, holders) = (&*segments, &leaf_of, &holders);
+            let (leaf_of, holders) = (&leaf_of, &holders);
             chunk.iter().enumerate().map(move |(at, &point)| {
                 let index = number * CHUNK + at;
                 // Beyond the last joint its place and the end of its parent's bone are equally near.
@@ -283,26 +308,63 @@ fn grow_leaves(
             })
         })
         .collect();
-    let mut regions: Vec<Vec<u32>> = vec![Vec::new(); leaves.len()];
     for (point, &leaf) in nearest.iter().enumerate() {
         if leaf != usize::MAX {
             regions[leaf].push(point as u32);
         }
     }
-    for (&(segment, joint), region) in leaves.iter().zip(&regions) {
-        let head = joints[joint].head;
-        let sum: Vec3 = region.iter().map(|&p| (points[p as usize] - head) * areas[p as usize]).sum();
-        let towards = sum.normalize_or_zero();
-        segments[segment].tail = if towards != Vec3::ZERO {
-            let reach = region.iter().map(|&p| (points[p as usize] - head).dot(towards)).fold(0f32, f32::max);
-            head + towards * reach * LEAF_REACH
-        } else {
-            // Nothing of the surface is nearest to it: half way to whatever lies ahead.
-            incoming_direction(joints, joint)
-                .and_then(|direction| Some(head + direction * sight.first(head, direction)? * 0.5))
-                .unwrap_or(head)
-        };
+    regions
+}
+
+/// Leaves the flesh alone in the region of the last joint at `head`, without what lies on it or is around it, and returns the
+/// island of the flesh. Flesh that lies evenly around the joint, as the rim of a head around the joint of a hat, tells no way.
+fn flesh_of_leaf(
+    region: &mut Vec<u32>,
+    joint: u32,
+    head: Vec3,
+    (points, areas): (&[Vec3], &[f32]),
+    layers: &Layers,
+    sight: &Sight,
+) -> Option<usize> {
+    /// The length of the mean of ways is more than this share of their mean length where most lead to one side.
+    const UNEVEN: f32 = 0.3;
+    let island = |point: &u32| sight.island(*point as usize);
+    let way = |point: &u32| points[*point as usize] - head;
+    let flesh = layers.flesh_of_last(joint, region.iter().map(|point| (island(point), way(point).length())))?;
+    let (mut sum, mut lengths) = (Vec3::ZERO, 0.0);
+    for point in region.iter().filter(|point| island(point) == flesh) {
+        sum += way(point) * areas[*point as usize];
+        lengths += way(point).length() * areas[*point as usize];
     }
+    if sum.length() > UNEVEN * lengths {
+        region.retain(|point| island(point) == flesh);
+    }
+    Some(flesh)
+}
+
+/// Lets the bone of a last joint run through the flesh around the joint: towards the centroid of the surface that is
+/// nearest to the joint, and nearly as far as that surface reaches. The direction in which the chain arrives would miss
+/// the toes of a foot that was entered from above.
+fn grow_leaf(
+    joints: &[WeightJoint],
+    joint: usize,
+    segment: &mut BoneSegment,
+    region: &[u32],
+    (points, areas): (&[Vec3], &[f32]),
+    sight: &Sight,
+) {
+    let head = joints[joint].head;
+    let sum: Vec3 = region.iter().map(|&p| (points[p as usize] - head) * areas[p as usize]).sum();
+    let towards = sum.normalize_or_zero();
+    segment.tail = if towards != Vec3::ZERO {
+        let reach = region.iter().map(|&p| (points[p as usize] - head).dot(towards)).fold(0f32, f32::max);
+        head + towards * reach * LEAF_REACH
+    } else {
+        // Nothing of the surface is nearest to it: half way to whatever lies ahead.
+        incoming_direction(joints, joint)
+            .and_then(|direction| Some(head + direction * sight.first(head, direction)? * 0.5))
+            .unwrap_or(head)
+    };
 }
 
 /// The direction in which the chain arrives at a joint; ancestors at the same place are passed over.
@@ -323,15 +385,16 @@ fn incoming_direction(joints: &[WeightJoint], joint: usize) -> Option<Vec3> {
 }
 
 /// Usual reach of the surface around each bone: a high quantile, by area, of the distances of the points that
-/// are nearest to the bone and see it. Points of parts that lie on others count for bones that are nearest to no other points,
-/// as for the bone of a hat.
+/// are nearest to the bone and see it; of the flesh, and of clothes around it. Points of parts that lie on others count for
+/// bones that are nearest to no other points, as for the bone of a hat.
 fn girths(
     segments: &[BoneSegment],
+    flesh: &[Option<usize>],
     holders: &Holders,
     points: &[Vec3],
     areas: &[f32],
     (sight, homes): (&Sight, &Homes),
-) -> Vec<f32> {
+) -> Vec<[f32; 2]> {
     let stride = points.len().div_ceil(SAMPLES).max(1);
     let samples: Vec<usize> = (0..points.len()).step_by(stride).collect();
     let measured: Vec<Option<(u32, f32)>> = samples
@@ -351,25 +414,32 @@ fn girths(
             })
         })
         .collect();
-    let mut around: Vec<[Vec<(f32, f32)>; 2]> = vec![Default::default(); segments.len()];
+    let mut around: Vec<[Vec<(f32, f32)>; 3]> = vec![Default::default(); segments.len()];
     for (&p, measure) in samples.iter().zip(measured) {
         if let Some((bone, distance)) = measure {
-            let lies = homes.lies_on_others(sight.island(p));
-            around[bone as usize][usize::from(lies)].push((distance, areas[p]));
+            let (island, joint) = (sight.island(p), segments[bone as usize].joint);
+            let layer = match homes.lies_on_others(island) {
+                true => 2,
+                false => usize::from(is_over(flesh[bone as usize], joint, island, homes)),
+            };
+            around[bone as usize][layer].push((distance, areas[p]));
         }
     }
-    let girth = |lists: &mut [Vec<(f32, f32)>; 2]| {
-        lists.iter_mut().find(|list| list.len() >= FEW).and_then(|list| quantile(list))
+    let girth = |lists: &mut [Vec<(f32, f32)>; 3]| {
+        let measure = |list: &mut Vec<(f32, f32)>| if list.len() >= FEW { quantile(list) } else { None };
+        let [flesh, over, lying] = lists.each_mut().map(measure);
+        let flesh = flesh.or(over).or(lying);
+        [flesh, over.or(flesh)]
     };
-    let mut girths: Vec<Option<f32>> = around.iter_mut().map(girth).collect();
-    let mut known: Vec<f32> = girths.iter().flatten().copied().collect();
+    let mut girths: Vec<[Option<f32>; 2]> = around.iter_mut().map(girth).collect();
+    let mut known: Vec<f32> = girths.iter().filter_map(|[flesh, _]| *flesh).collect();
     known.sort_by(f32::total_cmp);
     // Without a single measure no bone has a girth, and plain distance decides.
     let typical = known.get(known.len() / 2).copied().unwrap_or(f32::INFINITY);
-    for girth in &mut girths {
+    for girth in girths.iter_mut().flatten() {
         *girth = girth.filter(|&g| g > 0.05 * typical || typical == f32::INFINITY).or(Some(typical));
     }
-    girths.into_iter().map(|g| g.unwrap_or(typical)).collect()
+    girths.into_iter().map(|girths| girths.map(|girth| girth.unwrap_or(typical))).collect()
 }
 
 /// The distance within which [`GIRTH`] of the area lies.

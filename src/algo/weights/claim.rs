@@ -14,6 +14,9 @@ const HEAT: f32 = 12.0;
 const BAND: f32 = 0.1;
 /// A patch that its joint sees less of than this is not its own.
 const SEEN: f32 = 0.25;
+/// The least such share of a patch on a piece that its joint lies inside of: a tight shoe crosses itself between toes and hides most
+/// of itself there.
+const SEEN_AT_HOME: f32 = 0.1;
 /// Share by which the reach that a bone needs grows where the skin lies along the way to the bone rather than across it, when the
 /// two bones of a strong fold are compared; and twice as much where the skin faces towards the bone, as the palm of a fist faces
 /// the fingers.
@@ -54,11 +57,14 @@ pub(crate) fn claims(
         .flat_map_iter(|(number, chunk)| {
             let mut near = Vec::new();
             let first = number * CHUNK;
-            let skin = chunk.iter().zip(&normals[first..]).map(|(&point, &normal)| Skin { point, normal });
-            skin.enumerate().map(move |(at, skin)| claim(first + at, skin, bones, sight, &mut near))
+            let skin = (first..).zip(chunk.iter().zip(&normals[first..]));
+            skin.map(move |(index, (&point, &normal))| {
+                let skin = Skin { point, island: sight.island(index), normal };
+                claim(index, skin, bones, sight, &mut near)
+            })
         })
         .collect();
-    for leak in leaks(&claims, graph) {
+    for leak in leaks(&claims, bones, graph, sight) {
         claims[leak as usize].heat = 0.0;
     }
     claims
@@ -67,7 +73,7 @@ pub(crate) fn claims(
 /// Points that their joint does not hold: of patches of which it sees little, and of patches across the air from its
 /// bone that border on other joints, as the flank beside an arm that hangs down. Nostrils and the mouth lie across the
 /// air from the skull, too, but all around them is the head's.
-fn leaks(claims: &[Claim], graph: &Graph) -> Vec<u32> {
+fn leaks(claims: &[Claim], bones: &Bones, graph: &Graph, sight: &Sight) -> Vec<u32> {
     let joint = |v: usize| claims[v].shares[0].0;
     let mut leaks = Vec::new();
     let held = |v: usize| claims[v].heat > 0.0;
@@ -75,7 +81,10 @@ fn leaks(claims: &[Claim], graph: &Graph) -> Vec<u32> {
         let sum = |seen: bool| {
             patch.iter().filter(|v| !seen || claims[**v as usize].seen).map(|v| graph.areas[*v as usize]).sum::<f32>()
         };
-        if sum(true) < SEEN * sum(false) {
+        let first = patch[0] as usize;
+        let is_at_home = bones.is_resident(joint(first), sight.island(first));
+        let least = if is_at_home { SEEN_AT_HOME } else { SEEN };
+        if sum(true) < least * sum(false) {
             leaks.extend(patch);
         }
     }
@@ -130,6 +139,8 @@ fn reach(distance: f32, girth: f32) -> f32 {
 #[derive(Debug, Clone, Copy)]
 struct Skin {
     point: Vec3,
+    /// The island that it is of.
+    island: usize,
     /// Outward normal, shorter where the skin turns.
     normal: Vec3,
 }
@@ -138,7 +149,7 @@ impl Skin {
     /// Reach that a bone needs for this point, and cosine of the angle between the normal and the way from the bone.
     fn reach(self, bones: &Bones, bone: u32) -> (f32, f32) {
         let way = self.point - closest_on(&bones.segments[bone as usize], self.point);
-        (reach(way.length(), bones.girths[bone as usize]), self.normal.dot(way.normalize_or_zero()))
+        (reach(way.length(), bones.girth(bone, self.island)), self.normal.dot(way.normalize_or_zero()))
     }
 
     /// The reach by which the bones of a fold of a given strength are compared.
@@ -183,7 +194,7 @@ impl Skin {
 /// The claim on the point of an index; `near` is scratch space.
 fn claim(index: usize, skin: Skin, bones: &Bones, sight: &Sight, near: &mut Vec<(f32, u32)>) -> Claim {
     let mut result = Claim::default();
-    let (point, island) = (skin.point, sight.island(index));
+    let Skin { point, island, .. } = skin;
     let may_hold = |bone: u32| bones.may_hold(bone, island);
     let cost = |bone: u32| if may_hold(bone) { skin.reach(bones, bone).0 } else { f32::INFINITY };
     let least = |distance: f32| reach(distance, bones.largest_girth);

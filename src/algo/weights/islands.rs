@@ -5,14 +5,15 @@ use std::collections::BTreeMap;
 use glam::Vec3;
 
 use super::{
-    Method, WeightJoint, bone::BoneSegment, claim::Claim, grips::Grips, laplacian::Graph, report::Stiffness,
-    rings::RingBones, sight::is_surrounded,
+    Method, WeightJoint, attachments::Attachments, bone::BoneSegment, claim::Claim, grips::Grips, laplacian::Graph,
+    limb_parts::small_limbs, report::Stiffness, rings::RingBones, sight::is_surrounded,
 };
 use crate::mesh::{adjacency, model::Weights, surface::Surface};
 
 /// Heat is trusted on an island if at least this share of its area sees the bone that claims it.
 const SEEN: f32 = 0.15;
-/// Islands up to this size beside a mesh of size 2 move with what is around them: specks, buttons, teeth.
+/// Islands up to this size beside a mesh of size 2 move with what is around them: specks, buttons, teeth. Hands of their own, through
+/// which bones run, do not.
 const SPECK: f32 = 0.2;
 
 /// A part moves with one joint if that joint holds at least this share of it.
@@ -29,28 +30,37 @@ pub(crate) struct Islands {
     pub of: Vec<u32>,
     /// The longest side of each island's box.
     pub extents: Vec<f32>,
+    /// Flag of each island: whether it is small beside the whole mesh, and no limb.
+    small: Vec<bool>,
 }
 
 impl Islands {
-    /// Finds the pieces of a welded surface.
-    pub fn new(places: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+    /// Finds the pieces of a welded surface around joints.
+    pub fn new(places: &[Vec3], triangles: &[[u32; 3]], joints: &[WeightJoint]) -> Self {
         let (of, count) = adjacency::islands(triangles, places.len());
-        let mut boxes = vec![(Vec3::INFINITY, Vec3::NEG_INFINITY); count];
+        let mut boxes = vec![[Vec3::INFINITY, Vec3::NEG_INFINITY]; count];
         for (&island, &place) in of.iter().zip(places) {
-            let (low, high) = &mut boxes[island as usize];
+            let [low, high] = &mut boxes[island as usize];
             (*low, *high) = (low.min(place), high.max(place));
         }
-        Self { of, extents: boxes.into_iter().map(|(low, high)| (high - low).max_element()).collect() }
+        let extents: Vec<f32> = boxes.iter().map(|[low, high]| (*high - *low).max_element()).collect();
+        let mut small: Vec<bool> = extents.iter().map(|extent| *extent < SPECK).collect();
+        if count > 1 {
+            for island in small_limbs(&small, &boxes, &of, (places, triangles), joints) {
+                small[island] = false;
+            }
+        }
+        Self { of, extents, small }
     }
 
-    /// True if the island of a place is small beside the whole mesh.
+    /// True if the island of a place is small beside the whole mesh, and no limb.
     pub fn is_small(&self, place: usize) -> bool {
         self.are_small(self.of[place] as usize)
     }
 
-    /// True if an island is small beside the whole mesh.
+    /// True if an island is small beside the whole mesh, and no limb.
     pub fn are_small(&self, island: usize) -> bool {
-        self.extents[island] < SPECK
+        self.small[island]
     }
 
     /// Flag of each place: whether its island can be bound by heat.
@@ -70,7 +80,8 @@ impl Islands {
     /// Weights with which parts stay as stiff as they are: a part that one joint holds in nearly its whole size (helmet,
     /// eye, sword) moves with that joint, and each small part moves as one. The holder of a small part is the joint with
     /// the largest share. A part of which a slot beside flesh, as `slots` flags joints, holds the most is what it carries. A
-    /// ring moves with the one of `bones` that runs through it, and what fingers hold with the hand. A surface in one piece stays as it is, and so do the parts that have one of the `bending` places.
+    /// ring moves with the one of `bones` that runs through it, what fingers hold with the hand, and an attachment with what it
+    /// touches. A surface in one piece stays as it is, and so do the parts that have one of the `bending` places.
     pub fn stiffened(
         &self,
         (places, triangles): (&[Vec3], &[[u32; 3]]),
@@ -95,6 +106,7 @@ impl Islands {
         let is_part = members.iter().filter(|members| members.len() > 2).count() > 1;
         let grips = Grips::new(joints, bones);
         let ring_bones = RingBones::new(bones);
+        let attachments = is_part.then(|| Attachments::new((places, triangles), self, weights, (joints, bones)));
         let mut rows: Vec<Option<Vec<(u32, f32)>>> = (sums.iter().zip(&members).enumerate())
             .map(|(island, (sums, members))| {
                 if !is_part || members.len() < 3 || bends[island] {
@@ -111,8 +123,14 @@ impl Islands {
                 if let Some(joint) = ring_bones.bearer(members).or_else(carrier) {
                     return alone(joint);
                 }
+                if *first.1 >= HELD * whole {
+                    return alone(*first.0);
+                }
+                let holder = |attachments: &Attachments| attachments.holder(island, members, sums);
+                if let Some(joint) = attachments.as_ref().and_then(holder) {
+                    return alone(joint);
+                }
                 match self.are_small(island) {
-                    _ if *first.1 >= HELD * whole => alone(*first.0),
                     true => Some(sums.iter().map(|(joint, sum)| (*joint, sum / whole)).collect()),
                     false => None,
                 }
@@ -130,17 +148,18 @@ impl Islands {
         (stiff, Stiffness { of: self.of.clone(), holders })
     }
 
-    /// Gives each small part that several joints share to one of them, where one is known: a bolt on a helmet moves with the
-    /// joint that alone holds the helmet, whatever bones are near, and a tooth, which larger parts are all around, with the
-    /// joint that holds the most of it. Rows shared by joints would shrink such a part as they turn apart.
+    /// Gives small parts to what they lie on: a bolt on a helmet and an orb on a staff move with the joint that alone holds the
+    /// helmet or the staff, whatever bones are near. A tooth that several joints share, which larger parts are all around, moves with
+    /// the joint that holds the most of it. Rows shared by joints would shrink such a part as they turn apart.
     fn take_along(&self, places: &[Vec3], triangles: &[[u32; 3]], rows: &mut [Option<Vec<(u32, f32)>>]) {
         let joints = |island: usize| rows[island].as_ref().map_or(0, Vec::len);
         let is_bearer = |island: usize| joints(island) == 1 && !self.are_small(island);
-        let mut shared: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-        for (place, &island) in self.of.iter().enumerate().filter(|(_, island)| joints(**island as usize) > 1) {
-            shared.entry(island as usize).or_default().push(place);
+        let is_taken = |island: usize| joints(island) > 1 || joints(island) == 1 && self.are_small(island);
+        let mut small: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (place, &island) in self.of.iter().enumerate().filter(|(_, island)| is_taken(**island as usize)) {
+            small.entry(island as usize).or_default().push(place);
         }
-        if shared.is_empty() {
+        if small.is_empty() {
             return;
         }
         let island_of = |triangle: &[u32; 3]| self.of[triangle[0] as usize] as usize;
@@ -157,11 +176,14 @@ impl Islands {
             if let Some((bearer, _)) = most.filter(|(bearer, _)| is_bearer(*bearer)) {
                 return rows[bearer].clone();
             }
+            if joints(island) == 1 {
+                return None;
+            }
             let center = members.iter().map(|place| places[*place]).sum::<Vec3>() / members.len() as f32;
             let holder = rows[island].as_deref().and_then(strongest).filter(|_| is_surrounded(&surface, center));
             holder.map(|(joint, _)| vec![(joint, 1.0)])
         };
-        let taken = shared.iter().filter_map(|(island, members)| Some((*island, row_of(*island, members)?)));
+        let taken = small.iter().filter_map(|(island, members)| Some((*island, row_of(*island, members)?)));
         let taken: Vec<(usize, Vec<(u32, f32)>)> = taken.collect();
         for (island, row) in taken {
             rows[island] = Some(row);

@@ -33,7 +33,7 @@ pub(super) fn set_into_flesh(mut joints: Vec<WeightJoint>, sight: &Sight) -> Vec
         }
         let skin = sight.nearest(head)?;
         let gap = skin.distance(head);
-        if gap <= SAME || gap > BESIDE * length || sight.encloses(head) {
+        if gap <= SAME || gap > BESIDE * length || sight.is_inside(head) {
             return None;
         }
         let inward = (skin - head) / gap;

@@ -1,16 +1,18 @@
 //! Limbs that are body parts of their own, as the legs of a figure whose trunk is another piece of the mesh.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::Vec3;
 
 use super::{
     WeightJoint,
     bone::BoneSegment,
+    bone_tree::BoneTree,
     bones::LEAF_REACH,
     roots::{AT_HOME, STATIONS, parents_first, share},
-    sight::Sight,
+    sight::{Sight, encloses},
 };
+use crate::mesh::surface::Surface;
 
 /// Takes the bones of limbs that are parts of their own from the parts of the trunk in which they begin, with all bones below. A
 /// limb is a part of its own if a part holds its first bone and not the joint above it, and if no part of the trunk runs along
@@ -137,4 +139,55 @@ fn are_twins(joints: &[WeightJoint], bones: &[Vec<&BoneSegment>], joint: usize, 
     let (length, twin_length) = (way.length(), twin_way.length());
     let is_alike = (length - twin_length).abs() <= ALIKE * length.max(twin_length);
     joint != other && are_beside && is_alike && way.dot(twin_way) > 0.5 * length * twin_length
+}
+
+/// The small ones of some islands that are around whole bones, as hands that are pieces of their own. `boxes` are the islands'
+/// corners, and `of` has the island of each place.
+pub(super) fn small_limbs(
+    small: &[bool],
+    boxes: &[[Vec3; 2]],
+    of: &[u32],
+    (places, triangles): (&[Vec3], &[[u32; 3]]),
+    joints: &[WeightJoint],
+) -> BTreeSet<usize> {
+    /// Boxes around the middles of bones, and bones in boxes, that are looked at: in a crowd of shells around one bone nothing is a
+    /// limb.
+    const MOST_BOXES: usize = 1 << 18;
+    const MOST_BONES: usize = 1 << 12;
+    let islands: Vec<usize> = (0..small.len()).filter(|&island| small[island]).collect();
+    let corners = |&island: &usize| BoneSegment { joint: 0, head: boxes[island][0], tail: boxes[island][1] };
+    let diagonals: Vec<BoneSegment> = islands.iter().map(corners).collect();
+    let tree = BoneTree::of_boxes(&diagonals);
+    let mut within: BTreeMap<usize, Vec<[Vec3; 2]>> = BTreeMap::new();
+    let (mut looks, mut count) = (0, 0);
+    for joint in joints {
+        let Some(from) = joint.parent.map(|parent| joints[parent].head).filter(|&from| from != joint.head) else {
+            continue;
+        };
+        // What encloses most of a bone is around the middle of it.
+        tree.any_within(from.midpoint(joint.head), 0.0, |index| {
+            let BoneSegment { head: low, tail: high, .. } = diagonals[index as usize];
+            let is_in_box = |place: Vec3| place.cmpge(low).all() && place.cmple(high).all();
+            if share(from, joint.head, is_in_box) >= AT_HOME {
+                within.entry(islands[index as usize]).or_default().push([from, joint.head]);
+                count += 1;
+            }
+            looks += 1;
+            looks > MOST_BOXES || count > MOST_BONES
+        });
+        if looks > MOST_BOXES || count > MOST_BONES {
+            return BTreeSet::new();
+        }
+    }
+    let mut parts: BTreeMap<usize, Vec<[u32; 3]>> = within.keys().map(|&island| (island, Vec::new())).collect();
+    for triangle in triangles {
+        if let Some(part) = parts.get_mut(&(of[triangle[0] as usize] as usize)) {
+            part.push(*triangle);
+        }
+    }
+    let is_limb = |island: &usize| {
+        let surface = Surface::build(places, &parts[island]);
+        within[island].iter().any(|&[from, to]| share(from, to, |place| encloses(&surface, place)) >= AT_HOME)
+    };
+    within.keys().copied().filter(is_limb).collect()
 }

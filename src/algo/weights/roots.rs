@@ -47,7 +47,9 @@ impl Roots {
                 continue;
             }
             let (from, to) = (joints[parent].head, joints[index].head);
-            hangs_in_air[index] = share(from, to, |place| sight.encloses(place)) < 0.5;
+            let is_outside = share(from, to, |place| sight.encloses(place)) < 0.5;
+            hangs_in_air[index] =
+                is_outside || children[parent].len() == 1 && stands_below(joints, children, parent, index);
             stands_off[parent] |= hangs_in_air[index] && 2 * sizes[index] >= sizes[parent];
             is_root[index] = hangs_in_air[index] && !sight.encloses(to) && !sight.is_amid(to);
         }
@@ -241,6 +243,16 @@ impl Homes {
         self.parts.get(self.bearer(island))?.as_deref()
     }
 
+    /// Joints that are at home in each island, rising; `None` where everybody may hold it.
+    pub fn residents(&self) -> &[Option<Vec<u32>>] {
+        &self.parts
+    }
+
+    /// True if a joint is at home in an island, not counting those that everybody may hold.
+    pub fn is_resident(&self, joint: u32, island: usize) -> bool {
+        self.parts.get(island).and_then(Option::as_ref).is_some_and(|part| part.binary_search(&joint).is_ok())
+    }
+
     /// True if an island lies on others, as a hat or a buckle does: it is no flesh about a bone.
     pub fn lies_on_others(&self, island: usize) -> bool {
         self.lying.get(island) == Some(&true)
@@ -290,6 +302,25 @@ fn residents(segments: &[BoneSegment], joints: usize, sight: &Sight) -> BTreeSet
         }
     }
     residents
+}
+
+/// True if a root stands on the ground below its only child, and limbs come back from there down to it: a robe is around the way
+/// from the root to the hips as around the legs, but no flesh is.
+fn stands_below(joints: &[WeightJoint], children: &[Vec<usize>], root: usize, child: usize) -> bool {
+    /// Limbs come back at least this share of the way.
+    const BACK: f32 = 0.75;
+    /// Limbs that stand on the ground, at least.
+    const LEGS: usize = 2;
+    let way = joints[child].head - joints[root].head;
+    let (mut waiting, mut legs) = (vec![child], 0);
+    while let Some(joint) = waiting.pop() {
+        let back = joints[child].head - joints[joint].head;
+        match back.dot(way) >= BACK * way.length_squared() {
+            true => legs += 1,
+            false => waiting.extend(&children[joint]),
+        }
+    }
+    legs >= LEGS
 }
 
 /// Flag of each joint: whether it is at home in a part.

@@ -150,6 +150,12 @@ impl Sight {
         is_around
     }
 
+    /// True if the surface or one of its large islands is around a place: sheets of hair beside a head spoil the count of crossings
+    /// of the whole.
+    pub fn is_inside(&self, place: Vec3) -> bool {
+        self.encloses(place) || self.candidates(place).into_iter().any(|island| self.is_within(island, place))
+    }
+
     /// True if the pieces of a surface of several are around `point` in most directions, though none encloses it: hips between
     /// plates. Below a robe or between two shoes about half of the directions are free.
     pub fn is_amid(&self, point: Vec3) -> bool {
@@ -253,7 +259,7 @@ impl Sight {
 /// The mean of signed crossings is the generalised winding number (Jacobson et al. 2013), which holes weaken and shells
 /// inside each other strengthen, but which needs triangles of one orientation. The share of rays with an odd number of
 /// crossings does not.
-fn encloses(surface: &Surface, point: Vec3) -> bool {
+pub(super) fn encloses(surface: &Surface, point: Vec3) -> bool {
     enclosure(surface, point).0
 }
 

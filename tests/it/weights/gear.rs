@@ -10,7 +10,7 @@ use super::*;
 const COLUMNS: u32 = 24;
 
 /// Adds an upright band around the y axis, open at both ends, with rows at some heights, and returns its points.
-fn add_band(
+pub(super) fn add_band(
     points: &mut Vec<Vec3>,
     triangles: &mut Vec<[u32; 3]>,
     [wide, deep]: [f32; 2],
@@ -29,7 +29,7 @@ fn add_band(
 }
 
 /// Adds a sheet of rows of points, and returns its points.
-fn add_sheet(points: &mut Vec<Vec3>, triangles: &mut Vec<[u32; 3]>, rows: &[Vec<Vec3>]) -> Range<usize> {
+pub(super) fn add_sheet(points: &mut Vec<Vec3>, triangles: &mut Vec<[u32; 3]>, rows: &[Vec<Vec3>]) -> Range<usize> {
     let (first, width) = (points.len() as u32, rows[0].len() as u32);
     rows.iter().for_each(|row| points.extend(row));
     for row in 0..rows.len() as u32 - 1 {
@@ -42,13 +42,13 @@ fn add_sheet(points: &mut Vec<Vec3>, triangles: &mut Vec<[u32; 3]>, rows: &[Vec<
 }
 
 /// Heights from one to another, a tenth apart.
-fn heights(from: f32, to: f32) -> Vec<f32> {
+pub(super) fn heights(from: f32, to: f32) -> Vec<f32> {
     let count = ((to - from) * 10.0).round() as usize;
     (0..=count).map(|step| from + (to - from) * step as f32 / count as f32).collect()
 }
 
 /// Hips below a spine that leans back, and two legs.
-fn figure() -> Vec<WeightJoint> {
+pub(super) fn figure() -> Vec<WeightJoint> {
     vec![
         joint([0.0, 0.0, 0.0], None),
         joint([0.0, 0.6, -0.35], Some(0)),
@@ -64,7 +64,7 @@ fn figure() -> Vec<WeightJoint> {
 }
 
 /// A body around the figure, of one piece.
-fn body() -> (Vec<Vec3>, Vec<[u32; 3]>) {
+pub(super) fn body() -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let (mut points, mut triangles) = (Vec::new(), Vec::new());
     add_band(&mut points, &mut triangles, [0.5, 0.45], &heights(-1.6, 2.0));
     (points, triangles)
