@@ -19,7 +19,7 @@ mod turn;
 use bevy::math::ops;
 use glam::{Quat, Vec3, vec2, vec3};
 
-use self::{assemble::Measurements, relief::Relief, search::EyeHint};
+use self::{assemble::Measurements, eyes::EyeOpening, relief::Relief, search::EyeHint};
 use super::{
     depth_map::{DepthFrame, DepthMap, NO_TRIANGLE},
     shells::{ShellKind, Shells},
@@ -102,7 +102,7 @@ pub const fn mirrored(index: usize) -> usize {
 /// front gets landmarks; on anything but a human face their [`confidence`](Landmarks::confidence) is low.
 ///
 /// Takes about 5 ms at 11,000 points and 15 ms at 45,000 for a head that is exactly symmetric, twice that for another,
-/// and up to six times that where no face is clear at first.
+/// and up to twelve times that where no face is clear at first.
 ///
 /// # Errors
 /// [`LandmarkError`] for a point that is not finite, no skin, skin without depth, and where nothing can be laid onto
@@ -135,10 +135,26 @@ pub fn find_landmarks(points: &[Vec3], triangles: &[[u32; 3]], shells: &Shells) 
     let mut best = look(points, triangles, shells, None).map(|(found, normal)| (found, normal, Quat::IDENTITY));
     let sure = |found: &Result<Sighting, LandmarkError>| found.as_ref().map_or(-1.0, |found| found.0.confidence);
     if sure(&best) < 0.5 {
-        // The face may be turned aside. A mesh that is hardly a face from any side is taken in its given orientation.
-        for degrees in [-14.0f32, 14.0, -28.0, 28.0] {
+        // The face may be turned aside or tilted. A mesh that is hardly a face from any side is taken in its given orientation.
+        let about = |axis: Vec3, degrees: f32| {
             let half = degrees.to_radians() / 2.0;
-            let next = attempt(Quat::from_xyzw(0.0, ops::sin(half), 0.0, ops::cos(half)));
+            Quat::from_vec4((axis * ops::sin(half)).extend(ops::cos(half)))
+        };
+        let turned = [-14.0f32, 14.0, -28.0, 28.0].map(|turn| about(Vec3::Y, turn));
+        let tilted = [-14.0f32, 14.0].map(|tilt| about(Vec3::Z, tilt));
+        let both = [(-14.0f32, 14.0f32), (14.0, -14.0), (14.0, 14.0), (-14.0, -14.0)];
+        let both = both.map(|(turn, tilt)| about(Vec3::Y, turn) * about(Vec3::Z, tilt));
+        for rotation in turned.into_iter().chain(tilted) {
+            let next = attempt(rotation);
+            if sure(&next) > sure(&best).max(0.2) + 0.1 {
+                best = next;
+            }
+        }
+        for rotation in both {
+            if sure(&best) >= 0.5 {
+                break;
+            }
+            let next = attempt(rotation);
             if sure(&next) > sure(&best).max(0.2) + 0.1 {
                 best = next;
             }
@@ -203,7 +219,10 @@ fn look(
         let poses = middles.iter().filter_map(|&middle| search::find_face(&coarse, &solid, middle, hint));
         poses.max_by(|a, b| a.worth.total_cmp(&b.worth))
     };
-    let seen = find(hint).or_else(|| find(None));
+    let with_hint = find(hint);
+    // Eyeballs that no face fits are none.
+    let eyeballs = hint.filter(|_| with_hint.is_some());
+    let seen = with_hint.or_else(|| find(None));
     // If nothing looks like a face, the mean face of a person in the size of the front is used.
     let guessed = seen.is_none();
     let mut pose = seen.unwrap_or_else(|| search::guess(exact.unwrap_or((low.x + high.x) / 2.0), low, high));
@@ -217,10 +236,12 @@ fn look(
     let normal = if exact.is_none() { turn::plane(&fine, &pose) } else { Vec3::X };
     let middle = pose.center.x;
     let eyeball = |t: u32| matches!(kind(t as usize), ShellKind::LeftEye | ShellKind::RightEye);
-    let eyes = [-1.0, 1.0].map(|side| eyes::find_opening(&fine, &pose, side, eyeball));
-    let measured = assemble::measure(&fine, &pose, &eyes, exact.is_some());
-    let eyeballs = shells.kinds.iter().any(|kind| matches!(kind, ShellKind::LeftEye | ShellKind::RightEye));
-    let skin = eyeballs.then(|| front(fine.frame, points, triangles, |t| kind(t) == ShellKind::Skin).0);
+    // Eyeballs that cannot be seen are behind closed lids, on which dents tell nothing.
+    let is_sure = |eye: &EyeOpening| eyeballs.is_none() || !eye.is_dent;
+    let eyes = [-1.0, 1.0].map(|side| eyes::find_opening(&fine, &pose, side, eyeball).filter(is_sure));
+    let measured = assemble::measure(&fine, &pose, &eyes, eyeballs, exact.is_some());
+    let has_eyeballs = shells.kinds.iter().any(|kind| matches!(kind, ShellKind::LeftEye | ShellKind::RightEye));
+    let skin = has_eyeballs.then(|| front(fine.frame, points, triangles, |t| kind(t) == ShellKind::Skin).0);
     let found = lay(
         &measured,
         skin.as_ref().unwrap_or(&fine),

@@ -1,6 +1,7 @@
 //! Assembly of the 68 landmarks: the mean face is bent until it passes through the measured features, and laid onto the
 //! skin.
 
+use bevy::math::ops;
 use glam::{Vec2, Vec3, vec2, vec3};
 
 use super::{
@@ -9,7 +10,7 @@ use super::{
     prior::mean_landmarks,
     profile::{Curve, Profile},
     relief::Relief,
-    search::{Pose, fit_height},
+    search::{EyeHint, Pose, fit_height},
 };
 
 /// Measurements of one head.
@@ -32,6 +33,10 @@ pub(super) struct Measurements {
 /// opening narrows to a cleft there.
 const CLEFT: Vec2 = vec2(0.12, 0.07);
 
+/// Share of the deviation of a face's height from the mean, in logarithms, that is an error of its width, where no eye openings
+/// tell the width: with closed lids.
+const UNUSUAL: f32 = 0.67;
+
 /// The corners of an eye from its opening: (outer, inner), in head space.
 fn corners(eye: &EyeOpening) -> (Vec2, Vec2) {
     let along = eye.inner - eye.outer;
@@ -39,9 +44,21 @@ fn corners(eye: &EyeOpening) -> (Vec2, Vec2) {
     (eye.outer - vec2(along.x * 0.015, 0.0), inner)
 }
 
+/// Distances of the outer and inner corners of the eyes from the middle, in eye distances of the mean relief, between which a
+/// dent is an eye. Closed lids bulge, with hollows beside the nose and below the brow.
+const DENTS: [(f32, f32); 2] = [(0.43, 0.6), (0.13, 0.27)];
+
 /// Openings of the eyes, if they were found and mirror each other closely.
 fn symmetric_openings(eyes: &[Option<EyeOpening>; 2], pose: &Pose) -> Option<[EyeOpening; 2]> {
     let [Some(right), Some(left)] = eyes else { return None };
+    let is_eye = |eye: &EyeOpening| {
+        let (outer, inner) = corners(eye);
+        let mut ends = DENTS.iter().zip([outer, inner]);
+        ends.all(|((least, most), end)| (*least..=*most).contains(&((end.x - pose.center.x).abs() / pose.size)))
+    };
+    if [right, left].into_iter().any(|eye| eye.is_dent && !is_eye(eye)) {
+        return None;
+    }
     let flip = |place: Vec2| vec2(2.0 * pose.center.x - place.x, place.y);
     let far = 0.09 * pose.size;
     let near = right.outer.distance(flip(left.outer)) < far && right.inner.distance(flip(left.inner)) < far;
@@ -53,6 +70,7 @@ pub(super) fn measure(
     relief_map: &crate::algo::face::depth_map::DepthMap,
     pose: &Pose,
     eyes: &[Option<EyeOpening>; 2],
+    eyeballs: Option<EyeHint>,
     even: bool,
 ) -> Measurements {
     let eyes = symmetric_openings(eyes, pose);
@@ -61,6 +79,11 @@ pub(super) fn measure(
         let ((a, b), (c, d)) = (corners(right), corners(left));
         size = a.distance(c);
         center = vec2(pose.center.x, (a.y + b.y + c.y + d.y) / 4.0);
+    }
+    if eyes.is_none() {
+        // The relief tells heights well, but the width of a face only by its cheeks. Eyeballs behind closed lids tell both.
+        size = eyeballs.map_or(size * ops::powf(pose.tall, UNUSUAL), |eyeballs| eyeballs.size);
+        center.y = eyeballs.map_or(center.y, |eyeballs| eyeballs.center.y);
     }
     let mut tall = pose.tall * pose.size / size;
     if eyes.is_some() {
@@ -76,7 +99,9 @@ pub(super) fn measure(
         place.y *= upper;
     }
     let tip = profile.tip + 0.08 * (profile.nasion - profile.tip);
-    let chin = 0.6 * profile.menton + 0.4 * (profile.subnasale - 0.745 * tall);
+    // A jaw that is open takes the chin down with the lower lip.
+    let usual = profile.subnasale - 0.745 * tall - (profile.upper_edge - profile.lower_edge);
+    let chin = 0.6 * profile.menton + 0.4 * usual;
     let stretch = chin / mean[8].y;
     for place in &mut places[0..17] {
         let part = (place.y / mean[8].y).clamp(0.0, 1.0);
