@@ -19,7 +19,7 @@ mod turn;
 use bevy::math::ops;
 use glam::{Quat, Vec3, vec2, vec3};
 
-use self::{assemble::Measurements, eyes::EyeOpening, relief::Relief, search::EyeHint};
+use self::{assemble::Measurements, relief::Relief, search::EyeHint};
 use super::{
     depth_map::{DepthFrame, DepthMap, NO_TRIANGLE},
     shells::{ShellKind, Shells},
@@ -134,28 +134,25 @@ pub fn find_landmarks(points: &[Vec3], triangles: &[[u32; 3]], shells: &Shells) 
     };
     let mut best = look(points, triangles, shells, None).map(|(found, normal)| (found, normal, Quat::IDENTITY));
     let sure = |found: &Result<Sighting, LandmarkError>| found.as_ref().map_or(-1.0, |found| found.0.confidence);
-    if sure(&best) < 0.5 {
+    if sure(&best) < CLEAR {
         // The face may be turned aside or tilted. A mesh that is hardly a face from any side is taken in its given orientation.
         let about = |axis: Vec3, degrees: f32| {
             let half = degrees.to_radians() / 2.0;
             Quat::from_vec4((axis * ops::sin(half)).extend(ops::cos(half)))
         };
-        let turned = [-14.0f32, 14.0, -28.0, 28.0].map(|turn| about(Vec3::Y, turn));
-        let tilted = [-14.0f32, 14.0].map(|tilt| about(Vec3::Z, tilt));
-        let both = [(-14.0f32, 14.0f32), (14.0, -14.0), (14.0, 14.0), (-14.0, -14.0)];
-        let both = both.map(|(turn, tilt)| about(Vec3::Y, turn) * about(Vec3::Z, tilt));
-        for rotation in turned.into_iter().chain(tilted) {
-            let next = attempt(rotation);
+        for degrees in [-14.0f32, 14.0, -28.0, 28.0] {
+            let next = attempt(about(Vec3::Y, degrees));
             if sure(&next) > sure(&best).max(0.2) + 0.1 {
                 best = next;
             }
         }
-        for rotation in both {
-            if sure(&best) >= 0.5 {
+        let tilts = [(0.0f32, -14.0f32), (0.0, 14.0), (-14.0, 14.0), (14.0, -14.0), (14.0, 14.0), (-14.0, -14.0)];
+        for (turn, tilt) in tilts {
+            if sure(&best) >= CLEAR {
                 break;
             }
-            let next = attempt(rotation);
-            if sure(&next) > sure(&best).max(0.2) + 0.1 {
+            let next = attempt(about(Vec3::Y, turn) * about(Vec3::Z, tilt));
+            if sure(&next) >= CLEAR {
                 best = next;
             }
         }
@@ -184,6 +181,9 @@ type Sighting = (Landmarks, Vec3, Quat);
 
 /// Cosine of the largest turn of a face that is not searched again: 2 degrees.
 const LEAST_TURN: f32 = 0.9994;
+
+/// Confidence from which landmarks are those of a face.
+const CLEAR: f32 = 0.5;
 
 /// Confidence of landmarks where nothing looks like a face.
 const GUESSED: f32 = 0.05;
@@ -236,9 +236,7 @@ fn look(
     let normal = if exact.is_none() { turn::plane(&fine, &pose) } else { Vec3::X };
     let middle = pose.center.x;
     let eyeball = |t: u32| matches!(kind(t as usize), ShellKind::LeftEye | ShellKind::RightEye);
-    // Eyeballs that cannot be seen are behind closed lids, on which dents tell nothing.
-    let is_sure = |eye: &EyeOpening| eyeballs.is_none() || !eye.is_dent;
-    let eyes = [-1.0, 1.0].map(|side| eyes::find_opening(&fine, &pose, side, eyeball).filter(is_sure));
+    let eyes = [-1.0, 1.0].map(|side| eyes::find_opening(&fine, &pose, side, eyeball));
     let measured = assemble::measure(&fine, &pose, &eyes, eyeballs, exact.is_some());
     let has_eyeballs = shells.kinds.iter().any(|kind| matches!(kind, ShellKind::LeftEye | ShellKind::RightEye));
     let skin = has_eyeballs.then(|| front(fine.frame, points, triangles, |t| kind(t) == ShellKind::Skin).0);

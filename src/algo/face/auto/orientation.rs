@@ -34,8 +34,8 @@ pub(super) struct OrientedHead {
 
 /// Confidence from which landmarks tell a face: whether balls are eyes, and whether axes are right.
 const CLEAR: f32 = 0.5;
-/// Largest number of other orientations that are tried where the guessed one shows no clear face.
-const TRIES: usize = 8;
+/// Largest number of other orientations that are tried where the guessed one shows no clear face on a head.
+const TRIES: usize = 5;
 /// Cosine of the largest turn of a face that keeps the axes of its mesh: 4 degrees.
 const STRAIGHT: f32 = 0.997_56;
 
@@ -58,7 +58,12 @@ pub(super) fn orient(
         OrientedHead::new(points, triangles, axes, part)
     };
     let mut best = look(guess.axes);
-    if confidence(&best) < CLEAR && !matches!(best, Err(FaceError::Cancelled)) {
+    // Bodies stand on their legs, and tell their axes better than their heads do.
+    let is_head = match &best {
+        Ok(head) => head.part.is_none(),
+        Err(error) => matches!(error, FaceError::Landmarks(_)),
+    };
+    if is_head && confidence(&best) < CLEAR {
         for axes in other_axes(points, triangles, given, &guess.axes, TRIES) {
             let other = look(axes);
             if matches!(other, Err(FaceError::Cancelled)) {
@@ -73,12 +78,11 @@ pub(super) fn orient(
     let mut head = best?;
     head.certain = guess.certain && head.axes == guess.axes;
     if given == (None, None)
+        && head.part.is_none()
         && head.landmarks.confidence >= CLEAR
         && let Some(axes) = own_axes(&head)
-        && let Ok(own) = OrientedHead::new(points, triangles, axes, head.part.clone())
-        && own.landmarks.confidence >= CLEAR.max(head.landmarks.confidence - 0.1)
     {
-        head = OrientedHead { certain: head.certain, ..own };
+        head = head.reoriented(axes);
     }
     Ok(head)
 }
@@ -116,6 +120,17 @@ impl OrientedHead {
         }
         let (shells, landmarks) = find_features(&head, &faces).map_err(FaceError::Landmarks)?;
         Ok(Self { axes, certain: true, part, points: head, triangles: faces, shells, landmarks })
+    }
+
+    /// The same head, with the same face, in the space of other axes.
+    fn reoriented(mut self, axes: HeadAxes) -> Self {
+        let turn = axes.rotation() * self.axes.rotation().inverse();
+        self.points = turned(&self.points, turn);
+        let marks = &mut self.landmarks;
+        marks.points = marks.points.map(|mark| turn * mark);
+        marks.middle = (marks.points[27].x + marks.points[33].x) / 2.0;
+        marks.symmetric = false;
+        Self { axes, ..self }
     }
 }
 

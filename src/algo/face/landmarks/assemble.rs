@@ -33,9 +33,18 @@ pub(super) struct Measurements {
 /// opening narrows to a cleft there.
 const CLEFT: Vec2 = vec2(0.12, 0.07);
 
-/// Share of the deviation of a face's height from the mean, in logarithms, that is an error of its width, where no eye openings
-/// tell the width: with closed lids.
+/// Share of the deviation of a face's height from the mean, in logarithms, that is an error of its width, where lids are closed.
 const UNUSUAL: f32 = 0.67;
+
+/// Least quality of the match with the mean relief from which closed lids and open jaws are told from other shapes.
+const HUMAN: f32 = 0.8;
+
+/// Distance of a dent's inner end from the middle, in eye distances of the mean relief, below which the dent is no eye: closed
+/// lids bulge, with hollows beside the nose.
+const HOLLOW: f32 = 0.12;
+
+/// Gaps between the lips, in eye distances, at which an open jaw begins to show and is certain. Lips that pout are apart, too.
+const OPEN_JAW: (f32, f32) = (0.16, 0.3);
 
 /// The corners of an eye from its opening: (outer, inner), in head space.
 fn corners(eye: &EyeOpening) -> (Vec2, Vec2) {
@@ -44,21 +53,18 @@ fn corners(eye: &EyeOpening) -> (Vec2, Vec2) {
     (eye.outer - vec2(along.x * 0.015, 0.0), inner)
 }
 
-/// Distances of the outer and inner corners of the eyes from the middle, in eye distances of the mean relief, between which a
-/// dent is an eye. Closed lids bulge, with hollows beside the nose and below the brow.
-const DENTS: [(f32, f32); 2] = [(0.43, 0.6), (0.13, 0.27)];
+/// Returns `true` for lids that are closed: nothing but dents is seen, before eyeballs or where no eye can be.
+fn are_closed(eyes: &[Option<EyeOpening>; 2], eyeballs: Option<EyeHint>, pose: &Pose) -> bool {
+    if pose.worth < HUMAN || eyes.iter().flatten().any(|eye| !eye.is_dent) {
+        return false;
+    }
+    let is_hollow = |eye: &EyeOpening| (corners(eye).1.x - pose.center.x).abs() < HOLLOW * pose.size;
+    eyeballs.is_some() || (eyes.iter().all(Option::is_some) && eyes.iter().flatten().any(is_hollow))
+}
 
 /// Openings of the eyes, if they were found and mirror each other closely.
 fn symmetric_openings(eyes: &[Option<EyeOpening>; 2], pose: &Pose) -> Option<[EyeOpening; 2]> {
     let [Some(right), Some(left)] = eyes else { return None };
-    let is_eye = |eye: &EyeOpening| {
-        let (outer, inner) = corners(eye);
-        let mut ends = DENTS.iter().zip([outer, inner]);
-        ends.all(|((least, most), end)| (*least..=*most).contains(&((end.x - pose.center.x).abs() / pose.size)))
-    };
-    if [right, left].into_iter().any(|eye| eye.is_dent && !is_eye(eye)) {
-        return None;
-    }
     let flip = |place: Vec2| vec2(2.0 * pose.center.x - place.x, place.y);
     let far = 0.09 * pose.size;
     let near = right.outer.distance(flip(left.outer)) < far && right.inner.distance(flip(left.inner)) < far;
@@ -73,14 +79,15 @@ pub(super) fn measure(
     eyeballs: Option<EyeHint>,
     even: bool,
 ) -> Measurements {
-    let eyes = symmetric_openings(eyes, pose);
+    let closed = are_closed(eyes, eyeballs, pose);
+    let eyes = if closed { None } else { symmetric_openings(eyes, pose) };
     let (mut center, mut size) = (pose.center, pose.size);
     if let Some([right, left]) = &eyes {
         let ((a, b), (c, d)) = (corners(right), corners(left));
         size = a.distance(c);
         center = vec2(pose.center.x, (a.y + b.y + c.y + d.y) / 4.0);
     }
-    if eyes.is_none() {
+    if closed {
         // The relief tells heights well, but the width of a face only by its cheeks. Eyeballs behind closed lids tell both.
         size = eyeballs.map_or(size * ops::powf(pose.tall, UNUSUAL), |eyeballs| eyeballs.size);
         center.y = eyeballs.map_or(center.y, |eyeballs| eyeballs.center.y);
@@ -100,7 +107,9 @@ pub(super) fn measure(
     }
     let tip = profile.tip + 0.08 * (profile.nasion - profile.tip);
     // A jaw that is open takes the chin down with the lower lip.
-    let usual = profile.subnasale - 0.745 * tall - (profile.upper_edge - profile.lower_edge);
+    let gap = profile.upper_edge - profile.lower_edge;
+    let open = if pose.worth < HUMAN { 0.0 } else { (gap - OPEN_JAW.0) / (OPEN_JAW.1 - OPEN_JAW.0) };
+    let usual = profile.subnasale - 0.745 * tall - gap * open.clamp(0.0, 1.0);
     let chin = 0.6 * profile.menton + 0.4 * usual;
     let stretch = chin / mean[8].y;
     for place in &mut places[0..17] {
