@@ -134,40 +134,45 @@ pub fn find_landmarks(points: &[Vec3], triangles: &[[u32; 3]], shells: &Shells) 
     };
     let mut best = look(points, triangles, shells, None).map(|(found, normal)| (found, normal, Quat::IDENTITY));
     let sure = |found: &Result<Sighting, LandmarkError>| found.as_ref().map_or(-1.0, |found| found.0.confidence);
+    let about = |axis: Vec3, degrees: f32| {
+        let half = degrees.to_radians() / 2.0;
+        Quat::from_vec4((axis * ops::sin(half)).extend(ops::cos(half)))
+    };
     if sure(&best) < CLEAR {
-        // The face may be turned aside or tilted. A mesh that is hardly a face from any side is taken in its given orientation.
-        let about = |axis: Vec3, degrees: f32| {
-            let half = degrees.to_radians() / 2.0;
-            Quat::from_vec4((axis * ops::sin(half)).extend(ops::cos(half)))
-        };
+        // The face may be turned aside. A mesh that is hardly a face from any side is taken in its given orientation.
         for degrees in [-14.0f32, 14.0, -28.0, 28.0] {
             let next = attempt(about(Vec3::Y, degrees));
             if sure(&next) > sure(&best).max(0.2) + 0.1 {
                 best = next;
             }
         }
-        let tilts = [(0.0f32, -14.0f32), (0.0, 14.0), (-14.0, 14.0), (14.0, -14.0), (14.0, 14.0), (-14.0, -14.0)];
-        for (turn, tilt) in tilts {
-            if sure(&best) >= CLEAR {
+    }
+    // A face that is turned aside is searched again from its own front, as long as the result is no less clear.
+    let from_front = |(mut found, mut normal, mut rotation): Sighting| {
+        for _ in 0..2 {
+            if normal.x > LEAST_TURN {
                 break;
             }
-            let next = attempt(about(Vec3::Y, turn) * about(Vec3::Z, tilt));
-            if sure(&next) >= CLEAR {
-                best = next;
+            match attempt(Quat::from_rotation_arc(normal, Vec3::X) * rotation) {
+                Ok(next) if next.0.confidence >= found.confidence => (found, normal, rotation) = next,
+                _ => break,
             }
         }
-    }
-    let (mut found, mut normal, mut rotation) = best?;
-    // A face that is turned aside is searched again from its own front, as long as the result is no less clear.
-    for _ in 0..2 {
-        if normal.x > LEAST_TURN {
+        (found, normal, rotation)
+    };
+    best = best.map(from_front);
+    // Tilted views count only if they show a face.
+    let tilts = [(0.0f32, -14.0f32), (0.0, 14.0), (-14.0, 14.0), (14.0, -14.0), (14.0, 14.0), (-14.0, -14.0)];
+    for (turn, tilt) in tilts {
+        if sure(&best) >= CLEAR {
             break;
         }
-        match attempt(Quat::from_rotation_arc(normal, Vec3::X) * rotation) {
-            Ok(next) if next.0.confidence >= found.confidence => (found, normal, rotation) = next,
-            _ => break,
+        let next = attempt(about(Vec3::Y, turn) * about(Vec3::Z, tilt));
+        if sure(&next) >= CLEAR {
+            best = next.map(from_front);
         }
     }
+    let (mut found, _, rotation) = best?;
     if rotation != Quat::IDENTITY {
         let back = rotation.inverse();
         found.points = found.points.map(|point| back * point);

@@ -39,9 +39,9 @@ const UNUSUAL: f32 = 0.67;
 /// Least quality of the match with the mean relief from which closed lids and open jaws are told from other shapes.
 const HUMAN: f32 = 0.8;
 
-/// Distance of a dent's inner end from the middle, in eye distances of the mean relief, below which the dent is no eye: closed
-/// lids bulge, with hollows beside the nose.
-const HOLLOW: f32 = 0.12;
+/// Distances of an eye's inner corner from the middle, in eye distances of the mean relief. Closed lids bulge, with hollows
+/// beside the nose and at the temples.
+const INNER_CORNER: (f32, f32) = (0.14, 0.3);
 
 /// Gaps between the lips, in eye distances, at which an open jaw begins to show and is certain. Lips that pout are apart, too.
 const OPEN_JAW: (f32, f32) = (0.16, 0.3);
@@ -58,7 +58,10 @@ fn are_closed(eyes: &[Option<EyeOpening>; 2], eyeballs: Option<EyeHint>, pose: &
     if pose.worth < HUMAN || eyes.iter().flatten().any(|eye| !eye.is_dent) {
         return false;
     }
-    let is_hollow = |eye: &EyeOpening| (corners(eye).1.x - pose.center.x).abs() < HOLLOW * pose.size;
+    let is_hollow = |eye: &EyeOpening| {
+        let inner = (corners(eye).1.x - pose.center.x).abs() / pose.size;
+        !(INNER_CORNER.0..=INNER_CORNER.1).contains(&inner)
+    };
     eyeballs.is_some() || (eyes.iter().all(Option::is_some) && eyes.iter().flatten().any(is_hollow))
 }
 
