@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// True displacements of a head by name.
-fn true_shapes(folder: &Path, file: &str) -> Vec<(String, Vec<Vec3>)> {
+pub fn true_shapes(folder: &Path, file: &str) -> Vec<(String, Vec<Vec3>)> {
     let text = std::fs::read_to_string(folder.join(format!("heads/{file}.json"))).unwrap();
     let json: serde_json::Value = serde_json::from_str(&text).unwrap();
     let count = json["vertices"].as_u64().unwrap() as usize;

@@ -95,6 +95,7 @@ mod face_eyes;
 mod face_fit;
 mod face_grouping;
 mod face_landmarks;
+mod face_orientation;
 mod face_symmetry;
 mod face_teeth;
 mod face_units;

@@ -4,19 +4,21 @@
 //! bones); [`FaceAnalysis::rig`] computes those that depend on the density as well (facial bones and weights). With a
 //! kept analysis another density costs only the second half.
 
+mod orientation;
 mod refit;
 
 use glam::{Quat, Vec3};
 
+use self::orientation::{OrientedHead, orient};
 use super::{
-    axes::{AxesError, HeadAxes, guess_axes},
+    axes::{AxesError, HeadAxes},
     bones::{FaceBone, FaceBonesError, FaceBonesSettings, FixedBone, place_bones},
     expression::{ExpressionSet, FittedFace, UnitSet, repair_folds},
     grouping::{GroupingError, HeadGroups, group_head},
     head_bones::{HeadBones, HeadBonesError, head_bones},
-    head_part::{HeadPartError, head_part},
-    landmarks::{LandmarkError, Landmarks, find_landmarks},
-    shells::{MouthName, Shells, find_shells},
+    head_part::HeadPartError,
+    landmarks::{LandmarkError, Landmarks},
+    shells::{MouthName, Shells},
     weights::{FaceWeightsError, face_weights},
 };
 use crate::{algo::fit::FitError, mesh::model::Weights};
@@ -226,22 +228,8 @@ impl FaceAnalysis {
     ) -> Result<Self, FaceError> {
         check(points, triangles)?;
         let step = |step: FaceStep| begin(progress, step);
-        step(FaceStep::Axes)?;
-        let guess = guess_axes(points, triangles, settings.up, settings.forward).map_err(FaceError::Axes)?;
-        let turn = guess.axes.rotation();
-        let mut head: Vec<Vec3> = turned(points, turn);
-        let mut faces = triangles.to_vec();
-        let mut part = None;
-        if !settings.whole {
-            let found = head_part(&head, triangles).map_err(FaceError::Part)?;
-            if found.is_part {
-                let kept = kept(&found.points, triangles);
-                (head, faces) = cut(&head, triangles, &kept);
-                part = Some(kept);
-            }
-        }
-        step(FaceStep::Landmarks)?;
-        let (mut shells, landmarks) = find_features(&head, &faces).map_err(FaceError::Landmarks)?;
+        let OrientedHead { axes, certain, part, points: head, triangles: faces, mut shells, landmarks } =
+            orient(points, triangles, settings, &step)?;
         shells.mark_tongue(&head, &faces, &landmarks, &|_| None);
         step(FaceStep::Grouping)?;
         let groups =
@@ -250,8 +238,8 @@ impl FaceAnalysis {
         step(FaceStep::HeadBones)?;
         let bones = head_bones(&head, &faces, &groups, &landmarks).map_err(FaceError::HeadBones)?;
         Ok(Self {
-            axes: guess.axes,
-            certain: guess.certain,
+            axes,
+            certain,
             part,
             mesh_points: points.len(),
             points: head,
@@ -365,47 +353,6 @@ impl FaceAnalysis {
     }
 }
 
-/// Confidence from which landmarks tell whether balls are eyes.
-const CLEAR: f32 = 0.5;
-
-/// Finds the shells of a head and its landmarks.
-///
-/// Hats and sunglasses that are as large as skin hide the face: where parts are worn over the skin, the face is searched
-/// without them, and with them only if none is clear.
-fn find_features(points: &[Vec3], triangles: &[[u32; 3]]) -> Result<(Shells, Landmarks), LandmarkError> {
-    let shells = find_shells(points, triangles);
-    let Some(bare) = shells.without_worn(points, triangles) else { return find_face(points, triangles, shells) };
-    let bare = find_face(points, triangles, bare);
-    if bare.as_ref().is_ok_and(|(_, landmarks)| landmarks.confidence >= CLEAR) {
-        return bare;
-    }
-    let dressed = find_face(points, triangles, shells);
-    let confidence = |face: &Result<(Shells, Landmarks), _>| face.as_ref().map_or(-1.0, |(_, marks)| marks.confidence);
-    if confidence(&bare) > confidence(&dressed) { bare } else { dressed }
-}
-
-/// Finds the landmarks of a head whose shells are known.
-///
-/// Balls that are no eyes, such as buns of hair, mislead the search for landmarks. Where they are not behind the lids, or no
-/// face is clear with them, the face is searched without them, and the eyes on that face.
-fn find_face(points: &[Vec3], triangles: &[[u32; 3]], shells: Shells) -> Result<(Shells, Landmarks), LandmarkError> {
-    let landmarks = find_landmarks(points, triangles, &shells)?;
-    let is_clear = landmarks.confidence >= CLEAR;
-    if !shells.has_eyes() || (is_clear && shells.are_eyes_on_face(points, &landmarks)) {
-        return Ok((shells, landmarks));
-    }
-    let mut other = shells.without_eyes();
-    let least = CLEAR.max(landmarks.confidence + if is_clear { -0.1 } else { 0.2 });
-    let Some(plain) = find_landmarks(points, triangles, &other).ok().filter(|plain| plain.confidence >= least) else {
-        return Ok((shells, landmarks));
-    };
-    if !other.mark_eyes(points, triangles, &plain) {
-        return Ok((other, plain));
-    }
-    let found = find_landmarks(points, triangles, &other)?;
-    Ok(if found.confidence >= plain.confidence { (other, found) } else { (other, plain) })
-}
-
 fn check(points: &[Vec3], triangles: &[[u32; 3]]) -> Result<(), FaceError> {
     if points.is_empty() || triangles.is_empty() {
         return Err(FaceError::Empty);
@@ -433,32 +380,4 @@ fn within(progress: FaceProgress<'_>, step: FaceStep) -> impl Fn(f32) -> bool + 
 fn cancelled(progress: FaceProgress, error: FaceError) -> FaceError {
     let stopped = !progress(FaceStep::Weights, FaceStep::Weights.share().0);
     if stopped { FaceError::Cancelled } else { error }
-}
-
-fn turned(points: &[Vec3], turn: Quat) -> Vec<Vec3> {
-    if turn == Quat::IDENTITY { points.to_vec() } else { points.iter().map(|point| turn * *point).collect() }
-}
-
-/// Indices of the part's points that belong to triangles with all corners in the part.
-fn kept(part: &[bool], triangles: &[[u32; 3]]) -> Vec<u32> {
-    let mut used = vec![false; part.len()];
-    for triangle in triangles {
-        if triangle.iter().all(|corner| part[*corner as usize]) {
-            for corner in triangle {
-                used[*corner as usize] = true;
-            }
-        }
-    }
-    (0..part.len() as u32).filter(|point| used[*point as usize]).collect()
-}
-
-/// The mesh of the kept points alone.
-fn cut(points: &[Vec3], triangles: &[[u32; 3]], kept: &[u32]) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-    let mut numbers = vec![u32::MAX; points.len()];
-    for (number, point) in kept.iter().enumerate() {
-        numbers[*point as usize] = number as u32;
-    }
-    let whole = |triangle: &[u32; 3]| triangle.iter().all(|corner| numbers[*corner as usize] != u32::MAX);
-    let faces = triangles.iter().filter(|t| whole(t)).map(|t| t.map(|corner| numbers[corner as usize])).collect();
-    (kept.iter().map(|point| points[*point as usize]).collect(), faces)
 }

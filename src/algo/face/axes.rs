@@ -98,18 +98,7 @@ pub fn guess_axes(
         }
         return Ok(AxesGuess { axes: HeadAxes { up, forward: forward.normalize() }, certain: true });
     }
-    // The search runs in a frame in which a given direction is an axis.
-    let frame = match (up, forward) {
-        (Some(up), _) => Quat::from_rotation_arc(up, Vec3::Y),
-        (_, Some(forward)) => Quat::from_rotation_arc(forward, Vec3::Z),
-        _ => Quat::IDENTITY,
-    };
-    let turned: Vec<Vec3> = points.iter().map(|point| frame * *point).collect();
-    let evidence = Evidence::new(&turned, triangles);
-    let possible = ways().filter(|(u, f)| up.is_none_or(|_| *u == Vec3::Y) && forward.is_none_or(|_| *f == Vec3::Z));
-    let mut scored: Vec<(f32, Vec3, Vec3)> = possible.map(|(u, f)| (evidence.score(u, f), u, f)).collect();
-    // The usual orientation comes first and wins ties, since sorting is stable.
-    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let Ranking { frame, turned, evidence, scored } = Ranking::new(points, triangles, up, forward);
     let (best, u, f) = scored.first().copied().unwrap_or((0.0, Vec3::Y, Vec3::Z));
     let margin = best - scored.get(1).map_or(f32::MIN, |next| next.0);
     let certain = evidence.symmetric && margin >= CLEAR;
@@ -123,9 +112,63 @@ pub fn guess_axes(
     } else {
         scored.iter().map(|way| (way.1, way.2)).fold((u, f), usual)
     };
-    let back = frame.inverse();
-    let axes = HeadAxes { up: up.unwrap_or(back * u), forward: forward.unwrap_or(back * f) };
+    let axes = in_mesh(frame, (up, forward), (u, f));
     Ok(AxesGuess { axes, certain })
+}
+
+/// Orientations along the axes of the mesh's space other than `guess`, the most likely first, at most `most`. Given
+/// directions are respected; none are left where both are given.
+pub(super) fn other_axes(
+    points: &[Vec3],
+    triangles: &[[u32; 3]],
+    given: (Option<Vec3>, Option<Vec3>),
+    guess: &HeadAxes,
+    most: usize,
+) -> Vec<HeadAxes> {
+    let (up, forward) = (given.0.and_then(Vec3::try_normalize), given.1.and_then(Vec3::try_normalize));
+    if up.is_some() && forward.is_some() {
+        return Vec::new();
+    }
+    let Ranking { frame, scored, .. } = Ranking::new(points, triangles, up, forward);
+    let all = scored.into_iter().map(|(_, u, f)| in_mesh(frame, (up, forward), (u, f)));
+    let is_other = |axes: &HeadAxes| axes.up.dot(guess.up) < 0.9 || axes.forward.dot(guess.forward) < 0.9;
+    all.filter(is_other).take(most).collect()
+}
+
+/// Axes in the mesh's space from those in a search `frame`; given directions are kept as they are.
+fn in_mesh(frame: Quat, (up, forward): (Option<Vec3>, Option<Vec3>), (u, f): (Vec3, Vec3)) -> HeadAxes {
+    let back = frame.inverse();
+    HeadAxes { up: up.unwrap_or(back * u), forward: forward.unwrap_or(back * f) }
+}
+
+/// Possible orientations of a head in the order of their scores.
+struct Ranking {
+    /// Rotation from the mesh's space to the frame of the search, in which a given direction is an axis.
+    frame: Quat,
+    /// Points in that frame.
+    turned: Vec<Vec3>,
+    evidence: Evidence,
+    /// Score, up and forward in that frame, the best first.
+    scored: Vec<(f32, Vec3, Vec3)>,
+}
+
+impl Ranking {
+    /// Ranks the orientations that respect a given direction of unit length.
+    fn new(points: &[Vec3], triangles: &[[u32; 3]], up: Option<Vec3>, forward: Option<Vec3>) -> Self {
+        let frame = match (up, forward) {
+            (Some(up), _) => Quat::from_rotation_arc(up, Vec3::Y),
+            (_, Some(forward)) => Quat::from_rotation_arc(forward, Vec3::Z),
+            _ => Quat::IDENTITY,
+        };
+        let turned: Vec<Vec3> = points.iter().map(|point| frame * *point).collect();
+        let evidence = Evidence::new(&turned, triangles);
+        let possible =
+            ways().filter(|(u, f)| up.is_none_or(|_| *u == Vec3::Y) && forward.is_none_or(|_| *f == Vec3::Z));
+        let mut scored: Vec<(f32, Vec3, Vec3)> = possible.map(|(u, f)| (evidence.score(u, f), u, f)).collect();
+        // The usual orientation comes first and wins ties, since sorting is stable.
+        scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+        Self { frame, turned, evidence, scored }
+    }
 }
 
 /// The usual orientation, if it is among those possible.

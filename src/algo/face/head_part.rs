@@ -48,6 +48,9 @@ const WIDENS: f32 = 1.3;
 /// Least ratio of the height of a body to that of its head if it lifts a leg.
 const LIFTED: f32 = 3.0;
 
+/// Least share of a loose part's width and depth that lies below or within the head's topmost part, if it belongs to the head.
+const SHARED: f32 = 0.5;
+
 /// Finds the head of a mesh: all of it, or the head part of a body.
 ///
 /// `points` are in head space (+y up, +z forward), in any unit.
@@ -190,18 +193,36 @@ impl Body {
             .filter(|triangle| triangle.iter().all(|corner| near(*corner as usize)))
             .copied()
             .collect();
-        let (island_of, _) = adjacency::islands(&above, self.places.len());
-        let head = island_of[cut.tip];
-        let mut inside = (Vec3::MAX, Vec3::MIN);
-        for (place, island) in self.places.iter().zip(&island_of) {
-            if *island == head {
-                inside = (inside.0.min(*place), inside.1.max(*place));
+        let (island_of, count) = adjacency::islands(&above, self.places.len());
+        let mut boxes = vec![(Vec3::MAX, Vec3::MIN); count];
+        for corner in above.iter().flatten() {
+            let (place, (low, high)) =
+                (self.places[*corner as usize], &mut boxes[island_of[*corner as usize] as usize]);
+            (*low, *high) = (low.min(place), high.max(place));
+        }
+        let head = island_of[cut.tip] as usize;
+        let mut inside = boxes[head];
+        // The crown may be that of hair or of a hat, which are parts of their own: what lies below or within belongs to the
+        // head. Raised hands lie beside it.
+        let is_upright = cut.plane.1 == Vec3::Y;
+        let mut is_head = vec![false; count];
+        is_head[head] = true;
+        let mut largest: Vec<usize> = (0..count).filter(|island| boxes[*island].0.x <= boxes[*island].1.x).collect();
+        let size = |island: &usize| (boxes[*island].1 - boxes[*island].0).length();
+        largest.sort_by(|a, b| size(b).total_cmp(&size(a)).then(a.cmp(b)));
+        for island in largest {
+            let (low, high) = boxes[island];
+            let shared = high.min(inside.1) - low.max(inside.0);
+            let least = SHARED * (high - low);
+            if is_upright && shared.x >= least.x && shared.z >= least.z && shared.x > 0.0 && shared.z > 0.0 {
+                is_head[island] = true;
+                inside = (inside.0.min(low), inside.1.max(high));
             }
         }
-        // Eyes and teeth are loose, and lie within the head's box; raised hands do not.
+        // Eyes and teeth are loose, and lie within the head's box.
         let boxed = |place: Vec3| place.cmpge(inside.0).all() && place.cmple(inside.1).all();
         (0..self.places.len())
-            .map(|place| island_of[place] == head || (near(place) && boxed(self.places[place])))
+            .map(|place| is_head[island_of[place] as usize] || (near(place) && boxed(self.places[place])))
             .collect()
     }
 }

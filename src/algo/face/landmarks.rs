@@ -102,7 +102,7 @@ pub const fn mirrored(index: usize) -> usize {
 /// front gets landmarks; on anything but a human face their [`confidence`](Landmarks::confidence) is low.
 ///
 /// Takes about 5 ms at 11,000 points and 15 ms at 45,000 for a head that is exactly symmetric, twice that for another,
-/// and up to six times that where no face is clear at first.
+/// and up to twelve times that where no face is clear at first.
 ///
 /// # Errors
 /// [`LandmarkError`] for a point that is not finite, no skin, skin without depth, and where nothing can be laid onto
@@ -134,27 +134,45 @@ pub fn find_landmarks(points: &[Vec3], triangles: &[[u32; 3]], shells: &Shells) 
     };
     let mut best = look(points, triangles, shells, None).map(|(found, normal)| (found, normal, Quat::IDENTITY));
     let sure = |found: &Result<Sighting, LandmarkError>| found.as_ref().map_or(-1.0, |found| found.0.confidence);
-    if sure(&best) < 0.5 {
+    let about = |axis: Vec3, degrees: f32| {
+        let half = degrees.to_radians() / 2.0;
+        Quat::from_vec4((axis * ops::sin(half)).extend(ops::cos(half)))
+    };
+    if sure(&best) < CLEAR {
         // The face may be turned aside. A mesh that is hardly a face from any side is taken in its given orientation.
         for degrees in [-14.0f32, 14.0, -28.0, 28.0] {
-            let half = degrees.to_radians() / 2.0;
-            let next = attempt(Quat::from_xyzw(0.0, ops::sin(half), 0.0, ops::cos(half)));
+            let next = attempt(about(Vec3::Y, degrees));
             if sure(&next) > sure(&best).max(0.2) + 0.1 {
                 best = next;
             }
         }
     }
-    let (mut found, mut normal, mut rotation) = best?;
     // A face that is turned aside is searched again from its own front, as long as the result is no less clear.
-    for _ in 0..2 {
-        if normal.x > LEAST_TURN {
+    let from_front = |(mut found, mut normal, mut rotation): Sighting| {
+        for _ in 0..2 {
+            if normal.x > LEAST_TURN {
+                break;
+            }
+            match attempt(Quat::from_rotation_arc(normal, Vec3::X) * rotation) {
+                Ok(next) if next.0.confidence >= found.confidence => (found, normal, rotation) = next,
+                _ => break,
+            }
+        }
+        (found, normal, rotation)
+    };
+    best = best.map(from_front);
+    // Tilted views count only if they show a face.
+    let tilts = [(0.0f32, -14.0f32), (0.0, 14.0), (-14.0, 14.0), (14.0, -14.0), (14.0, 14.0), (-14.0, -14.0)];
+    for (turn, tilt) in tilts {
+        if sure(&best) >= CLEAR {
             break;
         }
-        match attempt(Quat::from_rotation_arc(normal, Vec3::X) * rotation) {
-            Ok(next) if next.0.confidence >= found.confidence => (found, normal, rotation) = next,
-            _ => break,
+        let next = attempt(about(Vec3::Y, turn) * about(Vec3::Z, tilt));
+        if sure(&next) >= CLEAR {
+            best = next.map(from_front);
         }
     }
+    let (mut found, _, rotation) = best?;
     if rotation != Quat::IDENTITY {
         let back = rotation.inverse();
         found.points = found.points.map(|point| back * point);
@@ -168,6 +186,9 @@ type Sighting = (Landmarks, Vec3, Quat);
 
 /// Cosine of the largest turn of a face that is not searched again: 2 degrees.
 const LEAST_TURN: f32 = 0.9994;
+
+/// Confidence from which landmarks are those of a face.
+const CLEAR: f32 = 0.5;
 
 /// Confidence of landmarks where nothing looks like a face.
 const GUESSED: f32 = 0.05;
@@ -203,7 +224,10 @@ fn look(
         let poses = middles.iter().filter_map(|&middle| search::find_face(&coarse, &solid, middle, hint));
         poses.max_by(|a, b| a.worth.total_cmp(&b.worth))
     };
-    let seen = find(hint).or_else(|| find(None));
+    let with_hint = find(hint);
+    // Eyeballs that no face fits are none.
+    let eyeballs = hint.filter(|_| with_hint.is_some());
+    let seen = with_hint.or_else(|| find(None));
     // If nothing looks like a face, the mean face of a person in the size of the front is used.
     let guessed = seen.is_none();
     let mut pose = seen.unwrap_or_else(|| search::guess(exact.unwrap_or((low.x + high.x) / 2.0), low, high));
@@ -218,9 +242,9 @@ fn look(
     let middle = pose.center.x;
     let eyeball = |t: u32| matches!(kind(t as usize), ShellKind::LeftEye | ShellKind::RightEye);
     let eyes = [-1.0, 1.0].map(|side| eyes::find_opening(&fine, &pose, side, eyeball));
-    let measured = assemble::measure(&fine, &pose, &eyes, exact.is_some());
-    let eyeballs = shells.kinds.iter().any(|kind| matches!(kind, ShellKind::LeftEye | ShellKind::RightEye));
-    let skin = eyeballs.then(|| front(fine.frame, points, triangles, |t| kind(t) == ShellKind::Skin).0);
+    let measured = assemble::measure(&fine, &pose, &eyes, eyeballs, exact.is_some());
+    let has_eyeballs = shells.kinds.iter().any(|kind| matches!(kind, ShellKind::LeftEye | ShellKind::RightEye));
+    let skin = has_eyeballs.then(|| front(fine.frame, points, triangles, |t| kind(t) == ShellKind::Skin).0);
     let found = lay(
         &measured,
         skin.as_ref().unwrap_or(&fine),

@@ -1,6 +1,7 @@
 //! Assembly of the 68 landmarks: the mean face is bent until it passes through the measured features, and laid onto the
 //! skin.
 
+use bevy::math::ops;
 use glam::{Vec2, Vec3, vec2, vec3};
 
 use super::{
@@ -9,7 +10,7 @@ use super::{
     prior::mean_landmarks,
     profile::{Curve, Profile},
     relief::Relief,
-    search::{Pose, fit_height},
+    search::{EyeHint, Pose, fit_height},
 };
 
 /// Measurements of one head.
@@ -32,11 +33,36 @@ pub(super) struct Measurements {
 /// opening narrows to a cleft there.
 const CLEFT: Vec2 = vec2(0.12, 0.07);
 
+/// Share of the deviation of a face's height from the mean, in logarithms, that is an error of its width, where lids are closed.
+const UNUSUAL: f32 = 0.67;
+
+/// Least quality of the match with the mean relief from which closed lids and open jaws are told from other shapes.
+const HUMAN: f32 = 0.8;
+
+/// Distances of an eye's inner corner from the middle, in eye distances of the mean relief. Closed lids bulge, with hollows
+/// beside the nose and at the temples.
+const INNER_CORNER: (f32, f32) = (0.14, 0.3);
+
+/// Gaps between the lips, in eye distances, at which an open jaw begins to show and is certain. Lips that pout are apart, too.
+const OPEN_JAW: (f32, f32) = (0.16, 0.3);
+
 /// The corners of an eye from its opening: (outer, inner), in head space.
 fn corners(eye: &EyeOpening) -> (Vec2, Vec2) {
     let along = eye.inner - eye.outer;
     let inner = eye.inner + vec2(along.x * CLEFT.x, -along.length() * CLEFT.y);
     (eye.outer - vec2(along.x * 0.015, 0.0), inner)
+}
+
+/// Returns `true` for lids that are closed: nothing but dents is seen, before eyeballs or where no eye can be.
+fn are_closed(eyes: &[Option<EyeOpening>; 2], eyeballs: Option<EyeHint>, pose: &Pose) -> bool {
+    if pose.worth < HUMAN || eyes.iter().flatten().any(|eye| !eye.is_dent) {
+        return false;
+    }
+    let is_hollow = |eye: &EyeOpening| {
+        let inner = (corners(eye).1.x - pose.center.x).abs() / pose.size;
+        !(INNER_CORNER.0..=INNER_CORNER.1).contains(&inner)
+    };
+    eyeballs.is_some() || (eyes.iter().all(Option::is_some) && eyes.iter().flatten().any(is_hollow))
 }
 
 /// Openings of the eyes, if they were found and mirror each other closely.
@@ -53,14 +79,21 @@ pub(super) fn measure(
     relief_map: &crate::algo::face::depth_map::DepthMap,
     pose: &Pose,
     eyes: &[Option<EyeOpening>; 2],
+    eyeballs: Option<EyeHint>,
     even: bool,
 ) -> Measurements {
-    let eyes = symmetric_openings(eyes, pose);
+    let closed = are_closed(eyes, eyeballs, pose);
+    let eyes = if closed { None } else { symmetric_openings(eyes, pose) };
     let (mut center, mut size) = (pose.center, pose.size);
     if let Some([right, left]) = &eyes {
         let ((a, b), (c, d)) = (corners(right), corners(left));
         size = a.distance(c);
         center = vec2(pose.center.x, (a.y + b.y + c.y + d.y) / 4.0);
+    }
+    if closed {
+        // The relief tells heights well, but the width of a face only by its cheeks. Eyeballs behind closed lids tell both.
+        size = eyeballs.map_or(size * ops::powf(pose.tall, UNUSUAL), |eyeballs| eyeballs.size);
+        center.y = eyeballs.map_or(center.y, |eyeballs| eyeballs.center.y);
     }
     let mut tall = pose.tall * pose.size / size;
     if eyes.is_some() {
@@ -76,7 +109,11 @@ pub(super) fn measure(
         place.y *= upper;
     }
     let tip = profile.tip + 0.08 * (profile.nasion - profile.tip);
-    let chin = 0.6 * profile.menton + 0.4 * (profile.subnasale - 0.745 * tall);
+    // A jaw that is open takes the chin down with the lower lip.
+    let gap = profile.upper_edge - profile.lower_edge;
+    let open = if pose.worth < HUMAN { 0.0 } else { (gap - OPEN_JAW.0) / (OPEN_JAW.1 - OPEN_JAW.0) };
+    let usual = profile.subnasale - 0.745 * tall - gap * open.clamp(0.0, 1.0);
+    let chin = 0.6 * profile.menton + 0.4 * usual;
     let stretch = chin / mean[8].y;
     for place in &mut places[0..17] {
         let part = (place.y / mean[8].y).clamp(0.0, 1.0);

@@ -15,6 +15,8 @@ pub(super) struct EyeOpening {
     pub inner: Vec2,
     /// Heights of the lower and the upper lid from the outer to the inner corner in even steps.
     pub lids: Vec<(f32, f32)>,
+    /// Marks a dent in closed skin, without a hole or an eyeball.
+    pub is_dent: bool,
 }
 
 impl EyeOpening {
@@ -54,7 +56,8 @@ pub(super) fn find_opening(
     let mut open: Vec<bool> = (0..width * height).map(|pixel| bare(pixel % width, pixel / width)).collect();
     let scale = pose.size / frame.pixel;
     let least = (0.004 * scale * scale) as usize;
-    if open.iter().filter(|&&open| open).count() < least {
+    let is_dent = open.iter().filter(|&&open| open).count() < least;
+    if is_dent {
         // Without hole and eyeball: a dent that neither a tall nor a wide window fills.
         let (tall, wide) = (((0.085 * scale) as usize).max(2), ((0.2 * scale) as usize).max(2));
         let mut filled = vec![f32::INFINITY; width * height];
@@ -100,7 +103,7 @@ pub(super) fn find_opening(
     if side > 0.0 {
         lids.reverse();
     }
-    Some(EyeOpening { outer, inner, lids })
+    Some(EyeOpening { outer, inner, lids, is_dent })
 }
 
 /// Morphological closing along a line: gaps narrower than a window of `reach` either side are filled.
