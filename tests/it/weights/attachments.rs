@@ -34,8 +34,8 @@ fn bows_and_packs_are_stiff() {
         assert_eq!(report.stiff, gear.len());
         holder(&weights, gear.clone());
         // A person may say that it bends.
-        let bending = vec![gear.start as u32..gear.start as u32 + 1];
-        let settings = WeightSettings { bending, ..WeightSettings::default() };
+        let first = gear.start as u32;
+        let settings = WeightSettings { bending: Vec::from([first..first + 1]), ..WeightSettings::default() };
         let bent = skin_weights(&points, &triangles, &figure(), &[], None, &settings, &|_| true).unwrap().1;
         assert_eq!(bent.stiff, 0);
     }
