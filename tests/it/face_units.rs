@@ -227,7 +227,6 @@ fn steps_of_lips(folder: &Path, name: &str) -> f64 {
 #[test]
 fn lips_have_no_notches() {
     let Some(folder) = test_data() else { return };
-    // Without soft corners and soft limits of influences: 0.93, 0.93, 0.92 and 1.02.
     for (name, most) in
         [("ict_neutral", 0.88), ("ict_identity_1", 0.89), ("ict_identity_2", 0.88), ("ict_identity_3", 1.0)]
     {

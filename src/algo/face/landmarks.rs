@@ -188,7 +188,7 @@ type Sighting = (Landmarks, Vec3, Quat);
 const LEAST_TURN: f32 = 0.9994;
 
 /// Confidence from which landmarks are those of a face.
-const CLEAR: f32 = 0.5;
+pub(in crate::algo::face) const CLEAR: f32 = 0.5;
 
 /// Confidence of landmarks where nothing looks like a face.
 const GUESSED: f32 = 0.05;

@@ -11,7 +11,7 @@ use super::volume::{FAR, VoxelGraph};
 
 /// Length of a branch below which it is a bump, as a share of the largest distance from the centre.
 const BUMP: f32 = 0.075;
-/// The same where short limbs of a long body are looked for.
+/// Length of a bump where short limbs of a long body are looked for, as the same share.
 const FINE_BUMP: f32 = 0.05;
 /// Length of an arc that is no more than an ear on a head, as a share of the largest distance from the centre.
 const SHORT: f32 = 0.62;
@@ -110,7 +110,7 @@ impl Branches {
     }
 }
 
-/// What of a volume is a branch of its own.
+/// Limbs of a volume that are branches of their own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Detail {
     /// Limbs; short ones that a long one bears are fingers of a hand.

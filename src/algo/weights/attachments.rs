@@ -8,6 +8,7 @@ use glam::Vec3;
 use super::{
     WeightJoint,
     bone::BoneSegment,
+    bone_tree::BoneTree,
     hierarchy::Hierarchy,
     islands::{Islands, SAMPLES},
     roots::{AT_HOME, share},
@@ -15,8 +16,12 @@ use super::{
 };
 use crate::mesh::{adjacency, model::Weights, surface::Surface};
 
-/// Pairs of bones and pieces that are looked at. In a crowd of shells around bones nothing is an attachment.
+/// Pairs of bones and pieces whose boxes are compared, and that are looked at. In a crowd of shells around bones nothing is an
+/// attachment.
+const MOST_BOXES: usize = 1 << 18;
 const MOST: usize = 1 << 12;
+/// Share of each of two bones, at least, that a sleeve over the joint where they meet encloses; of both together it is [`AT_HOME`].
+const SLEEVE: f32 = 0.2;
 /// Places of a piece touch the body if they are at most this share of the piece's size farther away from it than the nearest one.
 const TOUCH: f32 = 0.1;
 /// The places at which a hanging piece touches the body span at most this share of its size.
@@ -26,8 +31,9 @@ const THIN: f32 = 0.2;
 /// Square of the volume of a block beside that of a ball with the same surface, at least: a cube has 0.52, a box of three, three
 /// and one 0.34, a tight scarf 0.2, and folded cloth hardly any.
 const STOUT: f32 = 0.3;
-/// Share of a closed surface's edges that may be open.
-const OPEN: f32 = 0.1;
+/// Length of the open edges of a closed surface beside the root of its area, at most: a ball without its cap of a fifth of its radius
+/// has 0.35, a tube six radii long 2.
+const OPEN: f32 = 0.5;
 
 /// The large pieces of a mesh, and the surface of those around bones.
 pub(super) struct Attachments<'a> {
@@ -59,27 +65,7 @@ impl<'a> Attachments<'a> {
                 pieces[island].push(*triangle);
             }
         }
-        let mut is_boneless = vec![false; pieces.len()];
-        let mut looks = 0;
-        for (piece, is_boneless) in pieces.iter().zip(&mut is_boneless).filter(|(piece, _)| !piece.is_empty()) {
-            let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-            for place in piece.iter().flatten().map(|place| places[*place as usize]) {
-                (low, high) = (low.min(place), high.max(place));
-            }
-            // What is around most of a bone is around the middle of it.
-            let is_near = |bone: &&BoneSegment| {
-                let middle = bone.head.midpoint(bone.tail);
-                middle.cmpge(low).all() && middle.cmple(high).all()
-            };
-            let near: Vec<&BoneSegment> = bones.iter().filter(is_near).collect();
-            looks += near.len();
-            if looks > MOST {
-                break;
-            }
-            let surface = if near.is_empty() { Surface::default() } else { Surface::build(places, piece) };
-            let is_around = |bone: &BoneSegment| share(bone.head, bone.tail, |at| encloses(&surface, at)) >= AT_HOME;
-            *is_boneless = !near.into_iter().any(is_around);
-        }
+        let is_boneless = are_boneless(&pieces, places, bones);
         let fleshy = pieces.iter().zip(&is_boneless).filter(|(_, is_boneless)| !**is_boneless);
         let has_attachments = is_boneless.contains(&true);
         let flesh: Vec<[u32; 3]> = match has_attachments {
@@ -149,10 +135,8 @@ impl<'a> Attachments<'a> {
     /// True if some triangles are the closed surface of something stout: a pack, a barrel, a stone.
     fn is_block(&self, triangles: &[[u32; 3]]) -> bool {
         let edges = adjacency::edges(triangles);
-        let open = edges.iter().filter(|edge| edge.triangles == 1).count();
-        if open as f32 > OPEN * edges.len() as f32 {
-            return false;
-        }
+        let length = |[from, to]: [u32; 2]| self.places[from as usize].distance(self.places[to as usize]);
+        let open: f32 = edges.iter().filter(|edge| edge.triangles == 1).map(|edge| length(edge.points)).sum();
         let origin = self.places[triangles[0][0] as usize];
         let (mut volume, mut area) = (0f32, 0f32);
         for triangle in triangles {
@@ -160,8 +144,49 @@ impl<'a> Attachments<'a> {
             volume += a.cross(b).dot(c) / 6.0;
             area += (b - a).cross(c - a).length() / 2.0;
         }
-        36.0 * std::f32::consts::PI * volume * volume >= STOUT * area * area * area
+        open <= OPEN * area.sqrt() && 36.0 * std::f32::consts::PI * volume * volume >= STOUT * area * area * area
     }
+}
+
+/// Flag of each piece: whether it is there, and neither most of a bone runs through it nor parts of two bones that meet in it.
+fn are_boneless(pieces: &[Vec<[u32; 3]>], places: &[Vec3], bones: &[BoneSegment]) -> Vec<bool> {
+    let there: Vec<usize> = (0..pieces.len()).filter(|piece| !pieces[*piece].is_empty()).collect();
+    let diagonal = |piece: &usize| {
+        let corners = || pieces[*piece].iter().flatten().map(|place| places[*place as usize]);
+        let (head, tail) = (corners().fold(Vec3::INFINITY, Vec3::min), corners().fold(Vec3::NEG_INFINITY, Vec3::max));
+        BoneSegment { joint: 0, head, tail }
+    };
+    let boxes: Vec<BoneSegment> = there.iter().map(diagonal).collect();
+    let tree = BoneTree::of_boxes(&boxes);
+    let mut near: Vec<Vec<&BoneSegment>> = vec![Vec::new(); there.len()];
+    let (mut looks, mut pairs) = (0, 0);
+    for bone in bones {
+        let (low, high) = (bone.head.min(bone.tail), bone.head.max(bone.tail));
+        let is_crowd = tree.any_within(low.midpoint(high), 0.5 * low.distance(high), |index| {
+            let BoneSegment { head, tail, .. } = boxes[index as usize];
+            if low.cmple(tail).all() && high.cmpge(head).all() {
+                near[index as usize].push(bone);
+                pairs += 1;
+            }
+            looks += 1;
+            looks > MOST_BOXES || pairs > MOST
+        });
+        if is_crowd {
+            return vec![false; pieces.len()];
+        }
+    }
+    let mut flags = vec![false; pieces.len()];
+    for (&piece, near) in there.iter().zip(&near) {
+        let surface = if near.is_empty() { Surface::default() } else { Surface::build(places, &pieces[piece]) };
+        let share = |bone: &&BoneSegment| share(bone.head, bone.tail, |at| encloses(&surface, at));
+        let shares: Vec<(&BoneSegment, f32)> = near.iter().map(|bone| (*bone, share(bone))).collect();
+        let partly = || shares.iter().filter(|(_, share)| *share >= SLEEVE);
+        let is_sleeve = |(upper, share): &(&BoneSegment, f32)| {
+            partly().any(|(lower, other)| upper.tail == lower.head && share + other >= AT_HOME)
+        };
+        flags[piece] = !shares.iter().any(|(_, share)| *share >= AT_HOME) && !partly().any(is_sleeve);
+    }
+    flags
 }
 
 /// True if some places lie along a line: a bow, a staff, a quiver.

@@ -158,7 +158,7 @@ pub(super) fn keep_cheapest(list: &mut Vec<(f32, u32)>, best: f32, band: f32) {
 
 impl BoneTree {
     /// Calls `meet` for each bone of the nodes whose boxes are at most `radius` away from a point, until it returns `true`.
-    /// Returns whether it did.
+    /// Returns whether it did. A bone that lies in the tree piece by piece is met once for each piece.
     pub fn any_within(&self, point: Vec3, radius: f32, mut meet: impl FnMut(u32) -> bool) -> bool {
         let mut stack = [0u32; 64];
         let mut waiting = usize::from(!self.nodes.is_empty());

@@ -50,6 +50,7 @@ impl<'a> RingBones<'a> {
             false
         });
         near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        near.dedup();
         let bones = near.into_iter().map(|(_, index)| &self.bones[index as usize]);
         let outline = Outline::new(places, middle, size);
         let mut bones = bones.filter(|bone| outline.may_be_around(bone));

@@ -311,13 +311,17 @@ fn stands_below(joints: &[WeightJoint], children: &[Vec<usize>], root: usize, ch
     const BACK: f32 = 0.75;
     /// Limbs that stand on the ground, at least.
     const LEGS: usize = 2;
+    /// Legs rise no further beyond the child than this share of the way; arms hang from higher up.
+    const RISE: f32 = 0.25;
     let way = joints[child].head - joints[root].head;
     let (mut waiting, mut legs) = (vec![child], 0);
     while let Some(joint) = waiting.pop() {
         let back = joints[child].head - joints[joint].head;
-        match back.dot(way) >= BACK * way.length_squared() {
-            true => legs += 1,
-            false => waiting.extend(&children[joint]),
+        let share = back.dot(way) / way.length_squared();
+        if share >= BACK {
+            legs += 1;
+        } else if share >= -RISE {
+            waiting.extend(&children[joint]);
         }
     }
     legs >= LEGS

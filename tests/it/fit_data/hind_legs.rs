@@ -21,8 +21,7 @@ fn place(fit: &FittedSkeleton, label: &str) -> Vec3 {
     fit.joints[labels("quadruped").iter().position(|known| known == label).unwrap()].position
 }
 
-/// A dinosaur with a level trunk stands upright on its hind legs. While its hands were feet on a slope, it leant forward by 41
-/// degrees.
+/// A dinosaur with a level trunk stands upright on its hind legs: its hands are no feet on a slope.
 #[test]
 fn a_dinosaur_stands_on_its_hind_legs() {
     let trunk = [
@@ -49,8 +48,7 @@ fn a_dinosaur_stands_on_its_hind_legs() {
     }
 }
 
-/// Paws are longer than hooves: while the joints of all feet lay as far from the ends of legs, those over hooves were a quarter
-/// higher.
+/// Hooves are shorter than paws, and their joints lie nearer to the ends of the legs.
 #[test]
 fn joints_over_hooves_are_low() {
     let trunk = [

@@ -108,9 +108,8 @@ fn check(figures: &[FittedFigure], bounds: &[(&str, [f32; 2])]) {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// All limbs are assigned right in all forms. While the length of a tail counted as those of other limbs do, a thick and long one
-/// had no branch; while short legs at the ends of a long trunk were fingers of a hand, a fox with those of a dachshund was off by 180;
-/// while a load on one side was looked for in animals that walk, a dog that does was without its feet, and off by 8.
+/// All limbs are assigned right in all forms: thick and long tails are branches, short legs at the ends of a long trunk are no fingers
+/// of a hand, and the feet of an animal that walks are no load on one side.
 #[test]
 fn animals_of_other_forms_are_fitted() {
     let Some(figures) = known() else { return };

@@ -10,7 +10,7 @@ use super::{AutoSettings, FaceError, FaceStep};
 use crate::algo::face::{
     axes::{HeadAxes, guess_axes, other_axes},
     head_part::head_part,
-    landmarks::{LandmarkError, Landmarks, find_landmarks},
+    landmarks::{CLEAR, LandmarkError, Landmarks, find_landmarks},
     shells::{Shells, find_shells},
 };
 
@@ -32,8 +32,6 @@ pub(super) struct OrientedHead {
     pub landmarks: Landmarks,
 }
 
-/// Confidence from which landmarks tell a face: whether balls are eyes, and whether axes are right.
-const CLEAR: f32 = 0.5;
 /// Largest number of other orientations that are tried where the guessed one shows no clear face on a head.
 const TRIES: usize = 5;
 /// Cosine of the largest turn of a face that keeps the axes of its mesh: 4 degrees.
@@ -122,7 +120,7 @@ impl OrientedHead {
         Ok(Self { axes, certain: true, part, points: head, triangles: faces, shells, landmarks })
     }
 
-    /// The same head, with the same face, in the space of other axes.
+    /// Head with its face in the space of other axes.
     fn reoriented(mut self, axes: HeadAxes) -> Self {
         let turn = axes.rotation() * self.axes.rotation().inverse();
         self.points = turned(&self.points, turn);

@@ -14,7 +14,7 @@ const SOLE: f32 = 0.1;
 /// hooves are shorter.
 const PAW: f32 = 0.33;
 const WHOLE_SOLE: f32 = 0.42;
-/// The same below which ball and toes lie nearer to the end of the leg, by the square root of the share.
+/// Length of a foot, as the same share, below which ball and toes lie nearer to the end of the leg, by the square root of the share.
 const HOOF: f32 = 0.2;
 /// Least of that share.
 const SHORTEST: f32 = 0.75;
