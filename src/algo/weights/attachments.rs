@@ -20,8 +20,6 @@ use crate::mesh::{adjacency, model::Weights, surface::Surface};
 /// attachment.
 const MOST_BOXES: usize = 1 << 18;
 const MOST: usize = 1 << 12;
-/// Share of each of two bones, at least, that a sleeve over the joint where they meet encloses; of both together it is [`AT_HOME`].
-const SLEEVE: f32 = 0.2;
 /// Places of a piece touch the body if they are at most this share of the piece's size farther away from it than the nearest one.
 const TOUCH: f32 = 0.1;
 /// The places at which a hanging piece touches the body span at most this share of its size.
@@ -148,7 +146,7 @@ impl<'a> Attachments<'a> {
     }
 }
 
-/// Flag of each piece: whether it is there, and neither most of a bone runs through it nor parts of two bones that meet in it.
+/// Flag of each piece: whether it is there, and most of no bone runs through it.
 fn are_boneless(pieces: &[Vec<[u32; 3]>], places: &[Vec3], bones: &[BoneSegment]) -> Vec<bool> {
     let there: Vec<usize> = (0..pieces.len()).filter(|piece| !pieces[*piece].is_empty()).collect();
     let diagonal = |piece: &usize| {
@@ -161,10 +159,11 @@ fn are_boneless(pieces: &[Vec<[u32; 3]>], places: &[Vec3], bones: &[BoneSegment]
     let mut near: Vec<Vec<&BoneSegment>> = vec![Vec::new(); there.len()];
     let (mut looks, mut pairs) = (0, 0);
     for bone in bones {
-        let (low, high) = (bone.head.min(bone.tail), bone.head.max(bone.tail));
-        let is_crowd = tree.any_within(low.midpoint(high), 0.5 * low.distance(high), |index| {
-            let BoneSegment { head, tail, .. } = boxes[index as usize];
-            if low.cmple(tail).all() && high.cmpge(head).all() {
+        // What is around most of a bone is around the middle of it.
+        let middle = bone.head.midpoint(bone.tail);
+        let is_crowd = tree.any_within(middle, 0.0, |index| {
+            let BoneSegment { head: low, tail: high, .. } = boxes[index as usize];
+            if middle.cmpge(low).all() && middle.cmple(high).all() {
                 near[index as usize].push(bone);
                 pairs += 1;
             }
@@ -178,13 +177,8 @@ fn are_boneless(pieces: &[Vec<[u32; 3]>], places: &[Vec3], bones: &[BoneSegment]
     let mut flags = vec![false; pieces.len()];
     for (&piece, near) in there.iter().zip(&near) {
         let surface = if near.is_empty() { Surface::default() } else { Surface::build(places, &pieces[piece]) };
-        let share = |bone: &&BoneSegment| share(bone.head, bone.tail, |at| encloses(&surface, at));
-        let shares: Vec<(&BoneSegment, f32)> = near.iter().map(|bone| (*bone, share(bone))).collect();
-        let partly = || shares.iter().filter(|(_, share)| *share >= SLEEVE);
-        let is_sleeve = |(upper, share): &(&BoneSegment, f32)| {
-            partly().any(|(lower, other)| upper.tail == lower.head && share + other >= AT_HOME)
-        };
-        flags[piece] = !shares.iter().any(|(_, share)| *share >= AT_HOME) && !partly().any(is_sleeve);
+        let is_around = |bone: &&BoneSegment| share(bone.head, bone.tail, |at| encloses(&surface, at)) >= AT_HOME;
+        flags[piece] = !near.iter().any(is_around);
     }
     flags
 }

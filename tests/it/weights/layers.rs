@@ -175,3 +175,23 @@ fn joints_on_the_ground_hold_nothing_of_robes() {
     let weights = bind(&points, &triangles, &joints).0;
     assert!((0..points.len()).any(|point| weight(&weights, point, 10) > 0.5));
 }
+
+/// A bust whose arms hang as far down as the lowest joint has no legs: that joint holds the foot of the bust.
+#[test]
+fn arms_that_hang_are_no_legs() {
+    let (points, triangles) = body();
+    let mut joints = vec![
+        joint([0.0, -1.5, 0.0], None),
+        joint([0.0, 0.0, 0.0], Some(0)),
+        joint([0.0, 0.7, 0.0], Some(1)),
+        joint([0.0, 1.6, 0.0], Some(2)),
+    ];
+    for side in [-0.3, 0.3] {
+        let first = joints.len();
+        joints.push(joint([side, 1.1, 0.0], Some(2)));
+        joints.push(joint([side, 0.0, 0.0], Some(first)));
+        joints.push(joint([side, -1.3, 0.0], Some(first + 1)));
+    }
+    let weights = bind(&points, &triangles, &joints).0;
+    assert!((0..points.len()).any(|point| weight(&weights, point, 0) > 0.5));
+}
