@@ -138,7 +138,7 @@ fn a_thick_tail_is_a_tail() {
 }
 
 /// Heads lie where the neck widens to the skull: by the template's share of the way to the trunk, those of a dog in these forms were off
-/// by 9 to 16.
+/// by 7 to 11.
 #[test]
 fn heads_lie_where_necks_widen() {
     let Some(figures) = known() else { return };
@@ -146,14 +146,14 @@ fn heads_lie_where_necks_widen() {
     let mut count = 0;
     for fitted in of_dog {
         let name = &fitted.figure.name;
-        if ["short tail", "calf", "wide", "big head"].iter().any(|form| name.starts_with(form)) {
+        if ["short tail", "tail up", "wide"].iter().any(|form| name.starts_with(form)) {
             let off = fitted.off().into_iter().find(|(_, label, _)| *label == "head").unwrap().2;
             println!("{name}: the head is off by {off:.1}");
-            assert!(off <= 7.5, "{name}: {off}");
+            assert!(off <= 5.0, "{name}: {off}");
             count += 1;
         }
     }
-    assert_eq!(count, 4);
+    assert_eq!(count, 3);
 }
 
 /// Knees and elbows lie in flesh, and are doubted.
