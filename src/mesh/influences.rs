@@ -35,13 +35,13 @@ pub fn keep_strongest_alike(influences: &mut Vec<(u32, f32)>, most: usize, least
 }
 
 /// Share of the strongest influence that is left out by which those that stay are weakened.
-const SOFTNESS: f32 = 0.5;
+const SOFTNESS: f32 = 0.25;
 
-/// Keeps the strongest influences of a point as [`keep_strongest_alike`] does, and weakens each of them by half of the strongest
-/// one that is left out, before they are made to sum to one.
+/// Keeps the strongest influences of a point as [`keep_strongest_alike`] does, and weakens each of them by a quarter of the
+/// strongest one that is left out, before they are made to sum to one.
 ///
 /// Along a surface, one influence after the other becomes the one that is left out, which makes a step in the weights; so it is
-/// half as high. The influence of the joint `held` keeps its weight if it is one of the strongest.
+/// lower. The influence of the joint `held` keeps its weight if it is one of the strongest.
 pub fn keep_strongest_softly(influences: &mut Vec<(u32, f32)>, most: usize, least: f32, held: Option<u32>) {
     keep_strongest(influences, usize::MAX, 0.0);
     let most = most.max(1);

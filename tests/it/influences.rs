@@ -36,16 +36,25 @@ fn soft_influences(influences: &[(u32, f32)], most: usize, held: Option<u32>) ->
 
 #[test]
 fn the_one_that_is_left_out_weakens_the_others() {
-    let all = [(7, 0.5), (3, 0.25), (5, 0.125), (6, 0.125)];
-    assert_eq!(soft_influences(&all, 4, None), kept_influences(&all, 4, 0.0), "nothing is left out");
-    // Half of an eighth is taken from a half and a quarter.
-    assert_eq!(soft_influences(&all, 2, None), [(7, 0.7), (3, 0.3)]);
-    // Of the half that the others have, the quarter is all that stays.
-    assert_eq!(soft_influences(&all, 2, Some(7)), [(3, 0.5), (7, 0.5)]);
-    assert_eq!(soft_influences(&all, 1, Some(7)), [(7, 1.0)]);
-    assert_eq!(soft_influences(&all, 1, Some(6)), [(7, 1.0)], "a weak one is not held");
+    let all = [(7, 0.4), (3, 0.3), (5, 0.2), (6, 0.1)];
+    let check = |most: usize, held: Option<u32>, wanted: &[(u32, f32)]| {
+        let found = soft_influences(&all, most, held);
+        assert_eq!(found.len(), wanted.len(), "{found:?}");
+        for ((joint, weight), (wanted_joint, wanted_weight)) in found.iter().zip(wanted) {
+            assert!(joint == wanted_joint && (weight - wanted_weight).abs() < 1e-6, "{found:?} is not {wanted:?}");
+        }
+    };
+    check(4, None, &all);
+    // A quarter of a fifth is taken from both that stay.
+    check(2, None, &[(7, 0.35 / 0.6), (3, 0.25 / 0.6)]);
+    // Of what the others have, all stays with one of them.
+    check(2, Some(7), &[(3, 0.6), (7, 0.4)]);
+    check(1, Some(7), &[(7, 1.0)]);
+    // A weak one is not held.
+    check(1, Some(6), &[(7, 1.0)]);
     // Equally strong ones stay or go together.
-    assert_eq!(soft_influences(&all, 3, None), [(7, 0.7), (3, 0.3)]);
+    let alike = [(7, 0.4), (3, 0.2), (5, 0.2), (6, 0.2)];
+    assert_eq!(soft_influences(&alike, 3, None), [(7, 1.0)]);
     assert_eq!(soft_influences(&[(1, 0.5), (2, 0.5)], 1, None), [(1, 1.0)]);
 }
 

@@ -172,15 +172,22 @@ impl MeshAnalysis {
         let assign = |is_tried: &dyn Fn(&Tree) -> bool| {
             assign::assign(&self.graph, &self.trees, template, &directions, &limb_markers, is_tried)
         };
+        let wanted = template.limbs.len();
+        let is_figure = |found: &[Hypothesis]| {
+            let shown = found.first().map_or(0, |best| best.leaves.iter().filter(|l| l.is_some()).count());
+            shown * 2 >= wanted
+        };
         let mut found = assign(&|tree| !tree.is_last_resort());
-        if template.is_on_fours() && found.first().is_none_or(|best| best.posed_cost() > POOR) {
+        let is_poor = found.first().is_some_and(|best| best.posed_cost() > POOR);
+        if template.is_on_fours() && is_poor && is_figure(&found) {
             found = assign(&|_| true);
+        }
+        if is_figure(&found) {
+            return Ok(found);
         }
         let usual = self.trees.iter().filter(|tree| !tree.is_last_resort());
         let ends = usual.map(|tree| tree.branches.leaves.len()).max().unwrap_or(0);
-        let wanted = template.limbs.len();
-        let shown = found.first().map_or(0, |best| best.leaves.iter().filter(|l| l.is_some()).count());
-        if shown * 2 < wanted { Err(FitError::TooFewLimbs { found: ends, wanted }) } else { Ok(found) }
+        Err(FitError::TooFewLimbs { found: ends, wanted })
     }
 
     /// Least and greatest corner of the mesh in its space.

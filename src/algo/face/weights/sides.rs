@@ -10,9 +10,9 @@ use crate::algo::{
     weights::ldl::{LANES, Lane, Ldl, Symmetric},
 };
 
-/// Distance along the surface, as a share of the face's scale, over which the upper rim goes over into the lower one in the corners
-/// of each opening, where both are one skin.
-const CORNERS: [f32; OPENINGS] = [0.03, 0.1, 0.1];
+/// Distance along the surface, as a share of the face's scale, over which the upper rim goes over into the lower one in the
+/// corners of an opening, where both are one skin.
+const CORNER: f32 = 0.03;
 
 /// Upper or lower rim of lips or lids.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,7 +72,7 @@ impl Sides {
                 rim[opening] = nearest.map_or(Rim::None, |v| rims[v]);
             }
         }
-        let lower = [0, 1, 2].map(|opening| lower_shares(face, &rims[opening], opening));
+        let lower = [0, 1, 2].map(|opening| lower_shares(face, &rims[opening]));
         Self { rims, lower, bones }
     }
 
@@ -234,8 +234,8 @@ fn flood(face: &Face, zone: &Zone, rims: &mut [Rim]) {
     }
 }
 
-/// Share of the lower rim at each vertex: what the rims say, spread by heat along the surface over [`CORNERS`].
-fn lower_shares(face: &Face, rims: &[Rim], opening: usize) -> Vec<f32> {
+/// Share of the lower rim at each vertex: what the rims say, spread by heat along the surface over [`CORNER`].
+fn lower_shares(face: &Face, rims: &[Rim]) -> Vec<f32> {
     let mut shares: Vec<f32> = rims.iter().map(|rim| f32::from(u8::from(*rim == Rim::Lower))).collect();
     let inside: Vec<usize> = (0..rims.len()).filter(|&v| rims[v] != Rim::None).collect();
     if inside.is_empty() {
@@ -245,7 +245,7 @@ fn lower_shares(face: &Face, rims: &[Rim], opening: usize) -> Vec<f32> {
     inside.iter().enumerate().for_each(|(i, &v)| index[v] = i as u32);
     let areas: Vec<f64> = inside.iter().map(|&v| f64::from(face.graph.areas[v])).collect();
     let least = (1e-3 * areas.iter().sum::<f64>() / areas.len() as f64).max(1e-30);
-    let width = f64::from(CORNERS[opening] * face.map.scale);
+    let width = f64::from(CORNER * face.map.scale);
     let mut matrix = Symmetric { starts: vec![0], columns: Vec::new(), values: Vec::new(), diagonal: Vec::new() };
     for (&v, area) in inside.iter().zip(&areas) {
         let mut diagonal = area.max(least);
