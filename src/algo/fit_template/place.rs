@@ -1,7 +1,6 @@
 //! Placement: the template's joints on the centre lines of their branches and in the sections of the trunk.
 
 mod birds;
-mod heads;
 mod legs;
 mod soles;
 mod trunk;
@@ -237,7 +236,6 @@ impl Work<'_> {
         } else {
             self.hide_knee(limb, line, &mut lengths);
             self.keep_skull(limb, line, &mut lengths);
-            self.widen_to_skull(limb, line, &mut lengths);
             for _ in 0..if self.template.is_on_fours() { ROUNDS } else { 1 } {
                 self.bend(limb, line, &mut lengths, root);
             }

@@ -35,7 +35,8 @@ fn bows_and_packs_are_stiff() {
         holder(&weights, gear.clone());
         // A person may say that it bends.
         let first = gear.start as u32;
-        let settings = WeightSettings { bending: Vec::from([first..first + 1]), ..WeightSettings::default() };
+        let settings =
+            WeightSettings { bending: std::iter::once(first..first + 1).collect(), ..WeightSettings::default() };
         let bent = skin_weights(&points, &triangles, &figure(), &[], None, &settings, &|_| true).unwrap().1;
         assert_eq!(bent.stiff, 0);
     }
